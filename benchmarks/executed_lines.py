@@ -3,7 +3,7 @@
 `benchmarks.mutants` copies this file beside the packages of the Python that runs the tests, so that every process of a
 test tells its lines. Coverage does not see compiled code. A kernel that numba has compiled or loaded was called; all
 lines of it and of the kernels in it count as executed. Python instead of compiled kernels (NUMBA_DISABLE_JIT=1) would
-tell them line by line, but the kernels need numba: of `test_foot_springs` 4 of 7 tests fail without.
+tell them line by line, but the kernels need numba: of `test_stiffness_control` 4 of 7 tests fail without.
 """
 
 import atexit

@@ -12,7 +12,7 @@ from safetensors.numpy import save
 
 from springfoot.agents.policies.foreign import contract_path, onnx_policy
 from springfoot.agents.policies.policy import RUN, find_policy, read_policy
-from springfoot.agents.policies.schedules import schedule_file
+from springfoot.agents.policies.schedule_files import schedule_file
 from springfoot.agents.training.checkpoint import STATE_KEY, read_checkpoint
 from springfoot.agents.training.config import TrainingConfig, config_to_json
 from springfoot.agents.training.run_record import read_record

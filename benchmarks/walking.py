@@ -10,7 +10,7 @@ from mujoco.batch import Batch
 from numpy.typing import NDArray
 
 from springfoot.envs.batch.step_result import Tick
-from springfoot.envs.control.foot_springs import action_of
+from springfoot.envs.control.stiffness_control import action_of
 from springfoot.envs.physics.model import build_model
 from springfoot.envs.physics.timing import CONTROL_WINDOW, WINDOWS_PER_STEP
 from springfoot.envs.vector_env import SegmentedFootBipedVector

@@ -38,7 +38,10 @@ class Face:
 
     @spec.setter
     def spec(self, spec: EnvSpec | None) -> None:
-        """Keep a copy of the spec, with the settings' `max_episode_steps`."""
+        """Keep a copy of the spec, with the settings' `max_episode_steps`: they alone truncate this environment.
+
+        A limit given to `gym.make` is kept by a wrapper, `TimeLimit`, whose own spec names it.
+        """
         self._spec = copy(spec)
         if self._spec is not None:
             self._spec.max_episode_steps = self.settings.max_episode_steps

@@ -68,7 +68,7 @@ class SegmentedFootBipedVector(  # pyright: ignore[reportIncompatibleVariableOve
         self.single_observation_space, self.single_action_space = spaces_of(self.biped)
         self.observation_space: Space[NDArray] = batch_space(self.single_observation_space, num_envs)
         self.action_space: Space[NDArray] = batch_space(self.single_action_space, num_envs)
-        self._seeds = [-1] * num_envs
+        self._seeds = [-1] * num_envs  # Gymnasium's number for an unknown seed
         self._over = np.ones(num_envs, bool)
         self._started = False
 

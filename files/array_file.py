@@ -25,13 +25,13 @@ HEADER = "header"
 """Name of the array with the JSON text."""
 _FAULTS = (
     ArithmeticError,  # more entries than a number can count
-    AttributeError,
+    AttributeError,  # a header that is a number or a text
     EOFError,
-    LookupError,
+    LookupError,  # no header
     MemoryError,
     OSError,
     RuntimeError,  # a member under a password
-    TypeError,
+    TypeError,  # a header that is a list
     ValueError,
 )
 """Errors of `zipfile`, `numpy` and `json` on files of other contents."""
@@ -80,7 +80,8 @@ def read_arrays(path: Path, kind: str) -> tuple[dict[str, Any], dict[str, NDArra
 def _array(content: bytes) -> NDArray:
     """Return the array in an .npy file's content.
 
-    Raises `ValueError` for objects, and for a header that claims more data than there is.
+    Raises `ValueError` for objects, another version of the format, a header that cannot be read, and one that claims
+    more or less data than there is.
     """
     file = io.BytesIO(content)
     # NumPy's two versions of the format, each with its reader.

@@ -40,7 +40,8 @@ def bound_resources() -> None:
     except ImportError:
         return
     if Path("/proc/self/statm").exists():
-        used = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0]) * resource.getpagesize()
+        pages, *_ = Path("/proc/self/statm").read_text(encoding="ascii").split()  # of all its memory
+        used = int(pages) * resource.getpagesize()
         resource.setrlimit(resource.RLIMIT_AS, (used + MOST_MEMORY, used + MOST_MEMORY))
     resource.setrlimit(resource.RLIMIT_CPU, (MOST_SECONDS, MOST_SECONDS))
-    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # a crash leaves no file

@@ -178,7 +178,7 @@ def _keep_touching(path: Path, ended: threading.Event) -> None:
 
 
 def _owner_in(handle: int) -> dict[str, Any]:
-    """Return the record of the owner in an open file; empty if there is none."""
+    """Return the record of the owner in an open file; empty if there is none, or another content."""
     try:
         record = json.loads(os.pread(handle, MOST_OWNER_BYTES, 0))
     except (OSError, ValueError, RecursionError):
@@ -233,4 +233,4 @@ def _time_in_words(seconds: float) -> str:
     for unit, size in (("d", 86400), ("h", 3600), ("min", 60)):
         if seconds >= 2 * size:  # 1.5 h are better told as 90 min
             return f"{seconds / size:.0f} {unit}"
-    return f"{max(seconds, 0):.0f} s"
+    return f"{max(seconds, 0):.0f} s"  # below 0 if a clock was put back meanwhile

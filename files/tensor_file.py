@@ -26,7 +26,10 @@ MOST_TENSOR_BYTES, MOST_HEADER = 2**27, 2**24
 
 
 def write_tensors(path: Path, key: str, header: dict[str, Any], tensors: Mapping[str, np.ndarray]) -> None:
-    """Write tensors and, under `key`, a JSON header, whole or not at all; equal contents give equal bytes."""
+    """Write tensors and, under `key`, a JSON header, whole or not at all; equal contents give equal bytes.
+
+    Raises `SpringfootError` for a file that would be too large to read, and what `json` raises for another header.
+    """
     json.dumps(header, allow_nan=False)  # raises for what is no JSON
     packed = {name: np.asarray(tensor, order="C") for name, tensor in tensors.items()}
     text = _text(header | {DIGEST: digest_of(header, packed)})  # one entry: safetensors has no order of several
@@ -46,7 +49,7 @@ def read_tensors(
         key: of the header's JSON text.
         kind: name of such a file, in messages.
         entries: allowed entries of the JSON.
-        finite: refuse infinite numbers and NaN.
+        finite: refuse all numbers but finite float32 and float64.
         needs_digest: refuse a file without a digest; files of earlier versions have none.
 
     Raises `SpringfootError` for any other file.
@@ -67,7 +70,7 @@ def read_tensors(
                 raise SpringfootError(f"{path} is a .safetensors file, but no springfoot {kind}")
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
         header = json.loads(text)
-    except (SafetensorError, OSError, TypeError, AttributeError) as error:
+    except (SafetensorError, OSError, TypeError, AttributeError) as error:  # the last two: types NumPy lacks (bfloat16)
         raise SpringfootError(f"{path} is not a .safetensors file: {error}") from None
     except (ValueError, RecursionError) as error:
         raise SpringfootError(f"{path}: the springfoot entry of its header is not JSON: {error}") from None

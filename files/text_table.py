@@ -104,7 +104,8 @@ def read_bytes(path: Path, most: int = MOST_TEXT_BYTES) -> bytes:
     """
     with open_file(path) as file:
         size = os.fstat(file.fileno()).st_size
-        content = (file.read(most + 1) or b"") if size <= most else b""  # None instead of waiting
+        # One byte more than allowed shows that it has grown; a read that would have to wait gives None.
+        content = (file.read(most + 1) or b"") if size <= most else b""
     if max(size, len(content)) > most:
         raise SpringfootError(f"{path.name} must have at most {most:,} bytes, has {max(size, len(content)):,}")
     return content
@@ -130,6 +131,7 @@ def text_lines(path: Path) -> Iterator[str]:
     if b"\0" in content:
         raise SpringfootError(f"{path.name} is not a text file")
     try:
+        # utf-8-sig leaves out the mark with which spreadsheets begin a file.
         for number, line in enumerate(io.TextIOWrapper(io.BytesIO(content), encoding="utf-8-sig"), 1):
             if len(line) > LONGEST_LINE:
                 raise SpringfootError(f"{path.name}, line {number}: more than {LONGEST_LINE:,} letters")

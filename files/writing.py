@@ -64,7 +64,7 @@ def is_taken(path: Path) -> bool:
     """Tell whether a name is in use: by a file, a folder or a link, also by a link to nothing."""
     try:
         path.lstat()
-    except (FileNotFoundError, NotADirectoryError):
+    except (FileNotFoundError, NotADirectoryError):  # the latter: a file stands where its folder should
         return False
     return True
 
@@ -99,7 +99,7 @@ def whole_folder(out: Path | None, free: Path) -> Iterator[tuple[Path, Path]]:
     another process. After an error nothing is left; leftovers of a killed process are removed. Raises `SpringfootError`
     for an existing `out`.
     """
-    with ExitStack() as stack:
+    with ExitStack() as stack:  # holds the folder of the first free name until the block ends
         names = (free.with_name(f"{free.name}-{number}") for number in count(1)) if out is None else [out]
         for name in names:
             try:
@@ -134,7 +134,7 @@ def _hidden_folder(out: Path) -> Iterator[Path]:
                 _empty(part)
                 raise
     finally:
-        with suppress(OSError):
+        with suppress(OSError):  # it has become `out`, or it is not ours and has something in it
             part.rmdir()
 
 
@@ -169,7 +169,7 @@ def _empty(folder: Path) -> None:
     """Empty a folder, except for its owner's file."""
     for path in folder.iterdir() if folder.is_dir() else ():
         if path.is_dir() and not path.is_symlink():
-            shutil.rmtree(path, ignore_errors=True)
+            shutil.rmtree(path, ignore_errors=True)  # as far as it goes: no error may hide the one that led here
         elif path.name != OWNER:
             path.unlink(missing_ok=True)
 

@@ -136,7 +136,7 @@ def _error_message(error: Exception) -> str:
     if isinstance(error, UnicodeEncodeError):
         part = error.object[max(error.start - 40, 0) : error.end + 40]
         return f"a name must be UTF-8 text, got {quoted(part, LONGEST_WORD)}"
-    if not isinstance(error, OSError) or error.strerror is None:
+    if not isinstance(error, OSError) or error.strerror is None:  # None: raised by a library with a text alone
         return str(error)
     where = "" if error.filename is None else f": {error.filename}"
     safe = "; results are written whole or not at all" if error.errno in _NOT_WRITTEN else ""

@@ -32,7 +32,7 @@ def quoted(value: object, most: int = 60) -> str:
 
 def as_float(value: object) -> float:
     """Return a number as a float, infinite if it is too large; NaN for any other value."""
-    if not isinstance(value, Real) or isinstance(value, bool):
+    if not isinstance(value, Real) or isinstance(value, bool):  # True is the number 1 to Python, a mistake to us
         return nan
     try:
         return float(value)

@@ -15,9 +15,9 @@ from numpy.typing import ArrayLike
 
 from springfoot.arrays import NDArray
 from springfoot.envs.control.equilibrium import REFERENCE_STIFFNESS, fixed_stiffness, plateau_curve
-from springfoot.envs.control.foot_springs import action_of
 from springfoot.envs.control.phase_table import GRID, PLACE, PhaseTable, leg_phases
 from springfoot.envs.control.reference_walk import ReferenceWalk, tabulated_speeds, walks_of_legs
+from springfoot.envs.control.stiffness_control import action_of
 from springfoot.envs.physics.model import ACTIONS, SIDES
 from springfoot.envs.settings.settings import BipedSettings, body_of
 from springfoot.envs.task.observation_entries import OBSERVATION
@@ -185,7 +185,7 @@ def has_feedback(name: str) -> bool:
 
 
 def is_schedule_file(name: str) -> bool:
-    """Return True if the name is that of a schedule file (`springfoot.agents.policies.schedules`)."""
+    """Return True if the name is that of a schedule file (`springfoot.agents.policies.schedule_files`)."""
     return Path(name).suffix.lower() in SCHEDULE_SUFFIXES
 
 

@@ -16,9 +16,9 @@ from numpy.typing import ArrayLike
 from springfoot.arrays import NDArray
 from springfoot.envs.control.equilibrium import foot_curves
 from springfoot.envs.control.foot_rows import controlled_joints
-from springfoot.envs.control.foot_springs import stiffness_of
 from springfoot.envs.control.phase_table import SAMPLES
 from springfoot.envs.control.reference_walk import ReferenceWalk, rows, walks_of_legs
+from springfoot.envs.control.stiffness_control import stiffness_of
 from springfoot.envs.physics.model import ACTIONS, SIDES
 from springfoot.envs.settings.settings import BipedSettings, body_of
 from springfoot.envs.task.observation import OBSERVATION
@@ -57,7 +57,10 @@ def export_policy(policy: Policy, out: str | Path) -> list[Path]:
 
 
 def planned_files(out: str | Path) -> list[Path]:
-    """Return the files of an export, policy and contract; raise `SpringfootError` if one exists already."""
+    """Return the files of an export, policy and contract.
+
+    Raises `SpringfootError` if `out` does not end in `SUFFIX`, or one of them exists already.
+    """
     out = Path(out)
     if out.suffix != SUFFIX:
         raise SpringfootError(f"out must end in {SUFFIX}, got {out}")
@@ -97,6 +100,7 @@ def scale_of(settings: BipedSettings) -> Scale:
     """Return the `Scale` by which a policy's actions become stiffnesses in an environment of these settings."""
     joints = np.flatnonzero(controlled_joints(settings)).tolist()
     if settings.action_mode == "residual":
+        # An action a multiplies the schedule by e^a.
         return Scale("stiffness_factor", "1", joints, np.ones(len(joints)), np.full(len(joints), e))
     # K of the four actions' joints, ankle and toe of each leg, where all actions are 0, and where all are 1
     middle, stiffest = (
@@ -142,7 +146,7 @@ def contract_of(policy: Policy) -> dict[str, Any]:
         scale.name: {
             "shape": ["N", len(scale.joints)],
             "unit": scale.unit,
-            "entries": [
+            "entries": [  # rounded: without the last bits' noise
                 {"name": ACTIONS[joint], "low": round(float(low), 9), "high": round(float(high), 9)}
                 for joint, low, high in bounds
             ],
@@ -180,7 +184,7 @@ def _curves(settings: BipedSettings, walks: Sequence[ReferenceWalk]) -> dict[str
     for constants, walk in rows(walks):
         _, stiffness = foot_curves(settings, constants, walk)
         curves.append(stiffness[::SCHEDULE_STEP] / scale)
-    table = np.round(np.stack(curves), 6)  # (speed, percent, joint)
+    table = np.round(np.stack(curves), 6)  # (speed, percent, joint), without the last bits' noise
     return {"ankle": table[..., 0].tolist(), "toe": table[..., 1].tolist()}
 
 

@@ -10,9 +10,9 @@ import numpy as np
 from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.control.constants import LegConstants
 from springfoot.envs.control.equilibrium import foot_curves, foot_feed
-from springfoot.envs.control.foot_springs import stiffness_of
 from springfoot.envs.control.legs import PLANNED_PLACE, leg_curves
 from springfoot.envs.control.reference_walk import rows
+from springfoot.envs.control.stiffness_control import stiffness_of
 from springfoot.errors import SpringfootError
 
 _MODEL_NUMBERS = (

@@ -111,6 +111,6 @@ def _fails(session: Any, observations: NDArray) -> dict[str, str]:
 
 
 def one_line(error: Exception) -> str:
-    """Return an error's text in one line, at most 300 characters, with its class unless it is our own."""
+    """Return an error's text in one line; of an error that is not our own its class, and at most 300 characters."""
     text = " ".join(str(error).split())
     return text if isinstance(error, SpringfootError) else f"{type(error).__name__}: {text[:300]}"

@@ -199,7 +199,7 @@ def read_policy(name: str | Path) -> Policy:
         stored = dict(header["fingerprint"])
         settings = settings_from(**values)
         biped = Biped(settings, 1)
-    except (KeyError, TypeError, ValueError, OverflowError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError) as error:  # the last: an integer too large for a float
         fault = f"has no {error}" if isinstance(error, KeyError) else f"is not valid: {error}"
         raise SpringfootError(f"{name}: its header {fault}") from None
     known = activation in ACTIVATIONS and output in get_args(Output)

@@ -67,6 +67,7 @@ class TrainingConfig:
             require_count(name, getattr(self, name), 1, MOST_ENVIRONMENTS if name in _SIDE_BY_SIDE else MOST_COUNT)
         require_count("seed", self.seed, 0, 2**31 - 1)
         require_count("threads", self.threads, 0, MOST_THREADS)
+        # A step of each environment, and two samples in a minibatch: advantages are divided by their deviation in it.
         require_count("update_steps", self.update_steps, max(self.num_envs, 2 * self.minibatches))
         for name in ("learning_rate", "clip_range"):
             require_number(name, getattr(self, name), 0, _LARGEST, above=True)

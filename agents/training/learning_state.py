@@ -47,7 +47,7 @@ class Learning(TypedDict):
     episodes: list[Episode]
     """Latest episodes, whose mean return is rollout/ep_rew_mean."""
     logged: dict[str, list[Any]]
-    """Value and excluded formats of each unwritten entry of the logger."""
+    """Value and excluded formats of each unwritten number of the logger; texts and figures are not kept."""
 
 
 def learning_state(
@@ -124,6 +124,7 @@ def restore_learning(
         torch.set_rng_state(torch.from_numpy(arrays["random.torch"]))
     except SpringfootError:
         raise
+    # All that values of another kind raise; RuntimeError is torch's.
     except (KeyError, TypeError, ValueError, AttributeError, RuntimeError, OverflowError) as error:
         reason = " ".join(str(error).split())
         raise SpringfootError(f"the training state does not fit its configuration: {reason}") from None

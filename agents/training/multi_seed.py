@@ -49,7 +49,7 @@ def train_seeds(config: TrainingConfig, out: str | Path, seeds: int) -> dict[str
     from springfoot.envs import Biped  # not above: help needs no simulator
 
     require_count("seeds", seeds)
-    require_count("seed", config.seed + seeds - 1, 0, 2**31 - 1)
+    require_count("seed", config.seed + seeds - 1, 0, 2**31 - 1)  # the last one
     out = require_new(out)
     Biped(config.environment, 1)  # raises for settings that nobody can walk in, before anything is written
     configs = [replace(config, seed=config.seed + k) for k in range(seeds)]
@@ -192,7 +192,7 @@ class _Trainings:
                 print(f"{name}: {line}", end="", file=sys.stderr, flush=True)
         with self._lock:
             self._running.remove(process)
-        if process.returncode < 0 and not self.stopping:
+        if process.returncode < 0 and not self.stopping:  # below 0: a signal ended it
             ended = signal.Signals(-process.returncode).name
             saved = "it had saved nothing yet"
             if (folder / RUN).is_file():

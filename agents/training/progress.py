@@ -45,9 +45,8 @@ class Progress:
         """Print a line of progress if there is no bar."""
         if self._bar.disable:
             self._last_line = monotonic()
-            rate = (self._done - self._done_before) / max(
-                self._last_line - self._began, 1e-9
-            )  # [steps/s]; no time may have passed
+            seconds = max(self._last_line - self._began, 1e-9)  # no time may have passed
+            rate = (self._done - self._done_before) / seconds  # [steps/s]
             remaining = max(self._total - self._done, 0)
             left = f"{tqdm.format_interval(remaining / rate)} left" if rate and remaining else ""
             parts = f"{self._done:,} of {self._total:,} steps", self._state, left

@@ -93,9 +93,12 @@ def event_sizes(out: Path) -> dict[str, int]:
 
 
 def cut_events(out: Path, sizes: Mapping[str, int]) -> None:
-    """Cut the event files to `sizes` [bytes by name] and remove others: a resumed run writes the later events again."""
+    """Cut the event files to `sizes` [bytes by name], of `event_sizes` at a checkpoint, and remove others.
+
+    A run that is resumed from that checkpoint writes the later events again.
+    """
     for path in out.glob(EVENTS):
-        size = sizes.get(path.name, 0)  # 0 for a file that did not exist then
+        size = sizes.get(path.name, 0)  # 0 for a file that did not exist at the checkpoint
         if size == 0:
             path.unlink()
         elif path.stat().st_size > size:

@@ -122,6 +122,7 @@ def _merged(by_environment: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """Return the reset options of the batch, merged from those of each environment, `by_environment`.
 
     The options of `DRAWN` (bodies and speeds) may differ between environments and become lists; all others must agree.
+    Raises `SpringfootError` otherwise, and for one of `DRAWN` that is given to some environments only.
     """
     merged, *others = (
         {name: value for name, value in options.items() if name not in DRAWN} for options in by_environment

@@ -130,7 +130,8 @@ class Session(BaseCallback):
 
         `session` joins the record unless it only continues the last one: same code, settings and best return. A best
         policy with another return than the recorded one, as under another reward, is recorded in it anew. Random
-        generators are restored last, so that nothing draws in between.
+        generators are restored last, so that nothing draws in between. Raises `SpringfootError` for a checkpoint of
+        another version of the environment, or of another learner.
         """
         if self._start_from is None:
             self._record["sessions"].append(session)
@@ -180,10 +181,8 @@ class Session(BaseCallback):
         due = not evaluations or self._trained - evaluations[-1]["timesteps"] >= self._config.eval_interval
         if due and not self._stopping.asked:
             self._evaluate()
-        elif (
-            monotonic() - self._written_at > self._write_seconds / CHECKPOINT_TIME_FRACTION
-        ):  # seldom if writing is slow
-            self._write_checkpoint()
+        elif monotonic() - self._written_at > self._write_seconds / CHECKPOINT_TIME_FRACTION:
+            self._write_checkpoint()  # the more seldom the longer it takes
 
     def _on_step(self) -> bool:
         """Sum rewards and stiffness, and collect the infos of ended episodes; return False to end the training."""

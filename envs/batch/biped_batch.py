@@ -17,11 +17,11 @@ from springfoot.errors import SpringfootError
 from ..control.constants import LegConstants, SlopeConstants, slope_constants
 from ..control.decision_times import DecisionTimes
 from ..control.equilibrium import foot_tables
-from ..control.foot_springs import FootSprings, draw_delay
 from ..control.legs import LegController, slope_table
 from ..control.person_actions import PersonActions
 from ..control.reference_walk import rows, walks_of_legs
 from ..control.standing import WALKING, Standing, off_phase
+from ..control.stiffness_control import FootSprings, draw_delay
 from ..control.subjects import Subjects
 from ..physics.contact import CONTACTS
 from ..physics.foot import Feet
@@ -31,6 +31,7 @@ from ..physics.simulation import MjData, MjModel, Simulation
 from ..physics.timing import CONTROL_WINDOW
 from ..settings.checks import real_numbers
 from ..settings.settings import BipedSettings
+from ..task.episode_end import reasons_of
 from ..task.ground import Ground
 from ..task.initial_state import place, random_phase, start_table, walking_posture
 from ..task.observation import SensorNoise
@@ -367,13 +368,17 @@ class Biped(ExactState):
         if self.settings.sensor_noise:
             running = np.flatnonzero(step.running)
             self._noise.draw(running, [self._random[index] for index in running])
+        reasons = self._no_reason
+        if terminated:
+            min_hip_height = self._task.rows["scales"]["min_hip_height"]
+            reasons = reasons_of(self._simulation.now, min_hip_height, outcome.terminated)
         return StepResult(
             observation=self._noise.on(outcome.observation),
             reward=outcome.reward,
             terminated=outcome.terminated,
             truncated=outcome.truncated,
             values=outcome.values,
-            termination=self._task.reasons(self._simulation.now, outcome.terminated) if terminated else self._no_reason,
+            termination=reasons,
         )
 
 

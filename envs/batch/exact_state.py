@@ -64,7 +64,7 @@ class ExactState(ABC):
             restored = {name: np.asarray(state[name]).astype(values.dtype) for name, values in numbers.items()}
             for generator_state in state["generators"]:
                 _generator(None, generator_state)  # raises for a bad one
-        except (AttributeError, KeyError, TypeError, ValueError) as error:
+        except (AttributeError, KeyError, TypeError, ValueError) as error:  # the first: NumPy has no such generator
             raise SpringfootError(f"the state does not fit: {' '.join(str(error).split())}") from None
         self._embody(chosen, restored["control.subject.height"], restored["control.subject.mass"])
         for name, values in numbers.items():

@@ -16,12 +16,12 @@ import numpy as np
 
 from springfoot.arrays import NDArray
 
-from ..control.foot_springs import move, stiffen
 from ..control.legs import advance, drive
-from ..physics.kernel import kernel
+from ..control.stiffness_control import move, stiffen
+from ..physics.kernel import kernel, part
 from ..physics.measurement import measure_bodies
 from ..physics.simulation import Physics
-from ..task.episode_end import average
+from ..task.episode_end import end_episodes
 from ..task.observation import observe
 from ..task.reward import ALIVE, judge, remember, total
 from .step_result import Outcome, report
@@ -63,6 +63,7 @@ def begin_window(rows, bodies, tables, springs, walking) -> None:
     `begin_step`."""
     rows = EnvironmentRows(*rows)
     tables = Tables(*tables)
+    # Ankles and toes, then hips and knees.
     move(rows.controls, bodies, rows.control, tables.rest, tables.incline, tables.feet, springs, walking)
     drive(rows.controls, bodies, rows.control, tables.legs, tables.incline)
 
@@ -84,6 +85,25 @@ def end_window(rows, physics, window, walking) -> None:
             for contact in range(3):
                 for axis in range(2):
                     rows.forces[window, i, side, contact, axis] = force[side, contact, axis]
+
+
+@part
+def _average_forces(tasks, forces, running) -> None:
+    """Set `force` of environments `running` (N,) to the mean of their contact forces in the step, which the observation
+    shows and with which the next step's `impact` compares.
+
+    `tasks` is (N,) of `TASK_ROW`, `forces` as in `EnvironmentRows`.
+    """
+    for i in range(len(tasks)):
+        if not running[i]:
+            continue
+        for side in range(2):
+            for contact in range(3):
+                for axis in range(2):
+                    total_force = 0.0
+                    for window in range(len(forces)):
+                        total_force += forces[window, i, side, contact, axis]
+                    tasks[i].force[side, contact, axis] = total_force / len(forces)
 
 
 @kernel
@@ -138,15 +158,14 @@ def end_step(rows, physics, tables, task, walking, running, outcome) -> bool:
     outcome = Outcome(*outcome)
     end_window(rows, physics, len(forces) - 1, walking)
     terms = np.empty((len(running), len(task[0].weights)))
-    any_terminated = False
     judge(tasks, controls, bodies, target, task, forces, terms)
     total(terms, task, outcome.reward)
-    average(tasks, forces, running)
     remember(tasks, bodies, task, running)
+    _average_forces(tasks, forces, running)
+    any_terminated = end_episodes(
+        tasks, terms[:, ALIVE], running, task[0].most_steps, outcome.terminated, outcome.truncated
+    )
     for i in range(len(running)):
-        outcome.terminated[i] = running[i] and terms[i, ALIVE] == 0.0
-        outcome.truncated[i] = running[i] and not outcome.terminated[i] and tasks[i].steps >= task[0].most_steps
-        any_terminated = any_terminated or outcome.terminated[i]
         if running[i]:
             bodies[i].muscles.judged = 1  # the sums of the muscles' work begin anew in the next window
         else:

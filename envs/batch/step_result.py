@@ -7,7 +7,7 @@ import numpy as np
 
 from springfoot.arrays import NDArray
 
-from ..control.foot_springs import muscle_stiffness
+from ..control.stiffness_control import muscle_stiffness
 from ..physics.energy import WindowWork
 from ..physics.kernel import part
 from ..physics.measurement import Measurement

@@ -16,11 +16,11 @@ if TYPE_CHECKING:
         slope_constants_from,
     )
     from .equilibrium import PLATEAUS, REFERENCE_STIFFNESS, TOE_OFF, foot_curves, plateau_curve
-    from .foot_springs import FEET, action_of, stiffness_of, stiffness_ranges
     from .person import HELD_BY_SOUND, person_constants
     from .phase_table import GRID
     from .reference_walk import FED, reference_walk_at, tabulated_speeds
     from .standing import SLOW_SPEED
+    from .stiffness_control import FEET, action_of, stiffness_of, stiffness_ranges
     from .subjects import DRAWN, Subjects
 
 __all__ = [
@@ -58,7 +58,7 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
         {
             "DRAWN": "subjects",
             "FED": "reference_walk",
-            "FEET": "foot_springs",
+            "FEET": "stiffness_control",
             "GRID": "phase_table",
             "HELD_BY_SOUND": "person",
             "KNOTS": "constants",
@@ -70,7 +70,7 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
             "LegConstants": "constants",
             "SlopeConstants": "constants",
             "Subjects": "subjects",
-            "action_of": "foot_springs",
+            "action_of": "stiffness_control",
             "constants_from": "constants",
             "constants_name": "constants",
             "foot_curves": "equilibrium",
@@ -79,8 +79,8 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
             "plateau_curve": "equilibrium",
             "reference_walk_at": "reference_walk",
             "slope_constants_from": "constants",
-            "stiffness_of": "foot_springs",
-            "stiffness_ranges": "foot_springs",
+            "stiffness_of": "stiffness_control",
+            "stiffness_ranges": "stiffness_control",
             "tabulated_speeds": "reference_walk",
         },
     )

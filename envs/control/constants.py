@@ -223,6 +223,7 @@ def _sets_of(file: Path, name: str) -> dict[float, LegConstants]:
     """Return speed [m/s] -> the constants `name` in a file; raise `SpringfootError` if it does not have them."""
     try:
         return _sets(json.loads(read_bytes(file, MOST_JSON_BYTES))["constants"], name)
+    # All that reading other contents raises; RecursionError: nested too deeply.
     except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
         raise SpringfootError(f"{file} has no leg constants {name!r}: {error}") from None
 

@@ -1,4 +1,8 @@
-"""Tabulate the feet for the control's kernels: muscles or a device at each ankle and toe."""
+"""Tabulate the feet of a batch for the control's kernels: muscles or a device at each ankle and toe.
+
+The springs of devices, as of passive prosthetic feet, get their K here (`device`); muscles get theirs in
+`stiffness_control`.
+"""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -19,10 +23,11 @@ class FootLines(NamedTuple):
     """Tables of devices without a constant stiffness, for all feet of a batch; empty for feet of other kinds."""
 
     lines: NDArray
-    """(L, points, 3) torque-angle lines: angle [rad], torque [N m], and its fall from there on [N m/rad]. Missing
+    """(L, points, 3) L torque-angle lines: angle [rad], torque [N m], and its fall from there on [N m/rad]. Missing
     points of shorter lines lie at infinity."""
     curves: NDArray
-    """(S, SAMPLES, 2, 4) K [N m/rad] and theta_eq [rad] of ankle and toe over the stride, of a `PhaseTable`."""
+    """(S, SAMPLES, 2, 4) S schedules: K [N m/rad] and theta_eq [rad] of ankle and toe over the stride, of a
+    `PhaseTable`."""
 
 
 @part
@@ -64,7 +69,7 @@ def foot_lines(feet: Sequence[Feet]) -> FootLines:
     """
     tables = _tables(feet)
     schedules = _schedules(feet)
-    most_points = max([2, *map(len, tables)])
+    most_points = max([2, *map(len, tables)])  # a line has two at least, also the empty one
     lines = np.full((max(len(tables), 1), most_points, 3), np.inf)
     for line, table in zip(lines, tables, strict=False):
         angle, torque = np.array(table).T

@@ -91,7 +91,7 @@ def _adapted_constants(
         ]
         position = float(np.interp(speed, speeds, np.arange(len(speeds))))  # among the speeds, such as 1.5
         low = int(position)
-        high = min(low + 1, len(speeds) - 1)
+        high = min(low + 1, len(speeds) - 1)  # the last speed has no next one
         moved = tuned_value + differences[low] + (position - low) * (differences[high] - differences[low])
         values[name] = np.maximum(moved, LEAST_STIFFNESS.get(name, -np.inf)).tolist()
     return constants_from(values)

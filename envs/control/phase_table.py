@@ -61,7 +61,9 @@ def _read_all(table, place, phase, curves):
 
 
 class PhaseTable:
-    """Periodic curves on `GRID`; a reading has the same bits for any number of bodies.
+    """C periodic curves on `GRID` in each of R rows; a reading has the same bits for any number of bodies.
+
+    The rows are most often those of `reference_walk.rows`: variants of the leg constants x tabulated speeds.
 
     Args:
         curves: (SAMPLES, C), or (R, SAMPLES, C) for R rows.

@@ -136,9 +136,9 @@ def rows(walks: Sequence[ReferenceWalk]) -> Iterator[tuple[LegConstants, Referen
 def tabulated_speeds(settings: BipedSettings) -> NDArray:
     """Return (G,) ascending speeds [m/s] of the settings' body that cover all Froude speeds of the settings.
 
-    Without ranges this is the settings' speed alone. With ranges it is the multiples of `SPACING` that enclose them,
-    and the settings' speed. Where a multiple would leave both the ranges and `PLAN_SPEED_RANGE`, the range's end takes
-    its place: a short body at the fastest speed walks as this one would beyond it.
+    With one speed to cover this is the settings' speed alone. Else (`speed_range`, `height_range`, or a start or stop,
+    which go down to `SLOW_SPEED`) it is the multiples of `SPACING` that enclose all of them, and the settings' speed. A
+    multiple outside the speeds that are needed is pulled in to the nearest speed that is needed or can be planned.
     """
     height = settings.height
     speed = settings.speed
@@ -157,9 +157,11 @@ def tabulated_speeds(settings: BipedSettings) -> NDArray:
     first = floor(slow / unit / SPACING + 1e-9)  # 1e-9: a speed that is a multiple but for rounding needs no other one
     last = ceil(fast / unit / SPACING - 1e-9)
     multiples = [round(k * SPACING, 9) * unit for k in range(first, last + 1)]  # rounded: 12 x 0.1 is not 1.2
-    least, most = PLAN_SPEED_RANGE
-    within = {min(max(at, min(slow, least)), max(fast, most)) for at in multiples}
-    return np.array(sorted(within | {speed}))
+    slowest_planned, fastest_planned = PLAN_SPEED_RANGE
+    slowest = min(slow, slowest_planned)
+    fastest = max(fast, fastest_planned)
+    pulled_in = {min(max(multiple, slowest), fastest) for multiple in multiples}
+    return np.array(sorted(pulled_in | {speed}))
 
 
 @lru_cache(maxsize=256)

@@ -7,9 +7,9 @@ the next touchdown the same springs hold the body as it is, one foot ahead of th
 those of these springs while the body stands, and those of the fixed schedule while it sets off and slows down. A policy
 acts in the steady walk between, the only part of an episode that it has learnt.
 
-Lengths, times, speeds and gains are for 1.70 m and 63 kg and scale with the body (see `envs.physics.model`). Unless a
-source is given they were chosen by trial: bodies set off, walk and come to rest with them
-(`tests/envs/control/test_standing.py`).
+Lengths, times, speeds and gains are for 1.70 m and 63 kg and scale with the body (see `envs.physics.model`), but for
+the time of standing. Unless a source is given they were chosen by trial: bodies set off, walk and come to rest with
+them (`tests/envs/control/test_standing.py`).
 """
 
 from collections.abc import Sequence
@@ -103,7 +103,7 @@ def _switch(rows, bodies, running, time, stop_at):
             held.mode = WALKING
         elif before in (WALKING, STARTING) and time[i] >= stop_at:
             held.mode = STOPPING
-        elif before == STOPPING and subject.speed <= slow * (1.0 + 1e-9):
+        elif before == STOPPING and subject.speed <= slow * (1.0 + 1e-9):  # equal but for rounding
             for side in range(2):
                 if LANDED[0] <= phase[side] <= LANDED[1]:
                     held.mode = STOPPED
@@ -252,7 +252,7 @@ def steady_walk(settings: BipedSettings) -> tuple[float, float]:
     begin = 0.0
     end = inf if settings.stop_at is None else settings.stop_at
     if settings.start == "standing":
-        time_scale = sqrt(body_of(settings).length_scale)
+        time_scale = sqrt(body_of(settings).length_scale)  # of speeds, too
         speed_up = max(settings.speed - SLOW_SPEED * time_scale, 0.0) / settings.speed_rate
         begin = STAND_SECONDS[1] + OFF_SECONDS * time_scale + max(EARLY_SECONDS * time_scale, speed_up)
     return begin, end

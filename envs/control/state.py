@@ -65,7 +65,7 @@ FOOT = np.dtype(
         ("locked", np.int64, FEET),  # 1 where a device lets the joint not move
     ]
 )
-"""The ankles and toes of one environment: muscles and devices (`envs.control.foot_springs`)."""
+"""The ankles and toes of one environment: muscles and devices (`envs.control.stiffness_control`)."""
 SPRING_STATE = np.dtype(
     [
         ("stiffness", float, FEET),  # K of the muscles [N m/rad]
@@ -80,7 +80,7 @@ SPRING_STATE = np.dtype(
         ("requests", float, (1 + round(LONGEST_DELAY / CONTROL_WINDOW), *FEET)),  # in the last windows, newest first
     ]
 )
-"""The ankle and toe springs of one environment (`envs.control.foot_springs`)."""
+"""The ankle and toe springs of one environment (`envs.control.stiffness_control`)."""
 GAINS = np.dtype(
     [
         ("touchdown", float),  # vertical force of a foot that has landed [N]

@@ -27,9 +27,10 @@ MOST_DRAWS = 1000
 
 @kernel
 def _approach(most, running, subjects):
-    """Change the commanded speeds of `running` (N,) environments by at most `most` [m/s] towards their targets.
+    """Change the commanded speeds of environments `running` (N,) by at most `most` [m/s] towards their target speeds.
 
-    `subjects` is (N,) of `SUBJECT`. Returns True if any speed has not reached its target.
+    `subjects` is (N,) of `SUBJECT`. Returns True if any speed has not reached its target, also of an environment that
+    does not run now: it changes once that runs again.
     """
     under_way = False
     for i in range(len(subjects)):
@@ -214,7 +215,7 @@ class Subjects:
         time_scale = sqrt(body.height / self._home.height)
         low = self._speeds[0] * time_scale
         high = self._speeds[-1] * time_scale
-        if not low - 1e-9 <= speed <= high + 1e-9:
+        if not low - 1e-9 <= speed <= high + 1e-9:  # an end itself may err by rounding
             raise SpringfootError(
                 f"speed of a body of {body.height:.4g} m must be in [{low:.4g}, {high:.4g}] m/s, got {speed:.4g}; "
                 "speed_range and height_range say which speeds and bodies the tables are made for"

@@ -1,4 +1,5 @@
-"""Describe one foot as physics: muscles or a device at ankle and toe, an orthosis, segments of other mass.
+"""Describe one foot, sound or prosthetic, as physics: muscles or a device's springs at ankle and toe, an orthosis,
+segments of other mass.
 
 Angles are those of the joints (dorsiflexion, toe-up positive). Numbers of a device, or an orthosis, are the same on
 every body: they do not scale.

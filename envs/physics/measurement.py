@@ -228,7 +228,7 @@ def _read_joints(segments, plant, m):
     """
     for side in range(2):
         for joint in range(4):
-            theta = plant.qpos[3 + 4 * side + joint]
+            theta = plant.qpos[3 + 4 * side + joint]  # behind the trunk's x, z and pitch
             theta_rate = plant.qvel[3 + 4 * side + joint]
             m.angle[side, joint] = theta
             m.velocity[side, joint] = theta_rate

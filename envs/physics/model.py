@@ -212,7 +212,7 @@ def _load(trunk, body: Body) -> None:
     """Add the body's load: a box on the back, fixed to the trunk."""
     forward, up = body.carried_com
     load = _segment(trunk, "load", (forward, 0, up), body.carried_mass, (0, 0), body.carried_inertia)
-    box(load, np.array([0.075, 0.15, 0.25]) * body.length_scale)
+    box(load, np.array([0.075, 0.15, 0.25]) * body.length_scale)  # half-lengths: forward, sideways, up
 
 
 def _leg(trunk, body: Body, side: str, feet: Feet, hip_y: float) -> None:

@@ -127,7 +127,7 @@ def work_muscles(row, m, segments, velocity, control) -> None:
             middle[joint] = 0.5 * (row.angle[side, joint] + m.angle[side, joint])
         tissue = _tissue_moments(middle[0], middle[1], middle[2], middle[3])
         for joint in range(4):
-            dof = 3 + 4 * side + joint
+            dof = 3 + 4 * side + joint  # behind the trunk's x, z and pitch
             mean_torque = first = second = 0.0
             before = row.velocity[side, joint]
             theta = row.angle[side, joint]

@@ -119,7 +119,7 @@ def _open_window(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[Any, list[
         import mujoco.viewer
 
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
+            warnings.simplefilter("ignore")  # of glfw, which would say the same in words of its own
             if not glfw.init():  # without this check launch_passive would wait for ever
                 raise RuntimeError("no screen")
         window = mujoco.viewer.launch_passive(model, data, show_left_ui=False, show_right_ui=False)

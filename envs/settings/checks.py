@@ -151,7 +151,7 @@ def check_windows(name: str, delay: float | tuple[float, ...] | None) -> None:
     """Refuse a delay, or ends of a range of delays [s], that is not a multiple of the control window."""
     delays = delay if isinstance(delay, tuple) else (delay,)
     ends = [end for end in delays if end is not None]
-    if any(abs(end / CONTROL_WINDOW - round(end / CONTROL_WINDOW)) > 1e-9 for end in ends):
+    if any(abs(end / CONTROL_WINDOW - round(end / CONTROL_WINDOW)) > 1e-9 for end in ends):  # 1e-9: rounding
         raise SpringfootError(f"{name} must be whole steps of {CONTROL_WINDOW:g} s, got {delay!r}")
 
 
@@ -183,7 +183,7 @@ def real_numbers(name: str, value: Any) -> NDArray:
         if array.dtype == object and any(isinstance(item, (str, bytes, complex)) for item in array.flat):
             raise TypeError  # NumPy would read numbers out of text
         return np.array(array, float, order="C")
-    except (TypeError, OverflowError):
+    except (TypeError, OverflowError):  # OverflowError: an integer too large for a float
         refused = quoted(value)
     except SpringfootError:
         raise  # it is a ValueError too

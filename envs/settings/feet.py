@@ -1,4 +1,5 @@
-"""Read the settings `left_foot` and `right_foot`: kinds of feet and their numbers, once, into a `FootSetting`.
+"""Read the settings `left_foot` and `right_foot`: kinds of feet, sound or prosthetic, and their numbers, once, into a
+`FootSetting`, whose `foot` is that of the physics (`envs.physics.foot`).
 
 In plain JSON values a foot is a word, its kind, or a dictionary with a `kind` and any of the numbers of that kind;
 `adapted` says that the person has adapted to it (`envs.settings.adapted`).

@@ -9,7 +9,7 @@ import numpy as np
 from springfoot.arrays import NDArray
 from springfoot.gait.body.body import GRAVITY, Body
 
-from ..control.foot_springs import muscle_stiffness
+from ..control.stiffness_control import muscle_stiffness
 from ..physics.contact import CONTACTS
 from ..physics.kernel import kernel, part
 from ..physics.model import ACTIONS, ANKLE, JOINTS, LEFT, MOVED, SIDES

@@ -6,7 +6,6 @@ same bits as N batches of one.
 
 from collections.abc import Iterable, Sequence
 from math import exp
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,9 +19,9 @@ from springfoot.gait.body.tissue import (
 from springfoot.gait.plan.effort import ACTIVATION_TIME
 
 from ..control.constants import LegConstants
-from ..control.foot_springs import muscle_stiffness
 from ..control.phase_table import GRID, PhaseTable
 from ..control.reference_walk import ReferenceWalk
+from ..control.stiffness_control import muscle_stiffness
 from ..control.subjects import Subjects
 from ..physics.foot import Feet
 from ..physics.kernel import part
@@ -30,20 +29,13 @@ from ..physics.model import ANKLE, HIP, KNEE, LEFT, RIGHT
 from ..physics.muscles import tissue_stiffness
 from ..physics.timing import ACTION_STEP
 from ..settings.settings import DEFAULT_WEIGHTS, BipedSettings
-from .episode_end import TOO_LOW, TOO_TILTED, divergence
+from .episode_end import is_alive
 from .observation import HIGH, LOW, observe, units_of
 from .observation_entries import OBSERVATION, PERSON_OBSERVATION
 from .scales import body_scales
 from .state import TASK_ROW
 from .target import error_of, target_curves, targets_at, track
 from .worn import worn_entries
-
-if TYPE_CHECKING:
-    from ..physics.measurement import Measurement
-
-MAX_PITCH = 0.8
-"""Largest tilt of the trunk, forward or backward, before it counts as a fall [rad]; chosen: walking stays within 0.04
-rad."""
 
 POSE_TOLERANCE = 0.02
 """Pose error E at which its reward is 1/e [rad^2]; chosen: 2.8 deg at every joint."""
@@ -194,6 +186,7 @@ def _charged_stiffness(scale, controls, body, tendon, side, joint):
         return stiffness
     angle = body.measured.angle[side]
     unit = scale.stiffness_scale
+    # Calf and tendon alone: K may be below the tissue's, and the angles have moved on since it was bounded.
     together = stiffness - unit * tissue_stiffness(angle[KNEE], angle[ANKLE])
     together = min(max(together, 0.0), TENDON_SHARE * unit * tendon)
     torque = abs(body.muscles.moment[0, side, ANKLE])
@@ -239,8 +232,7 @@ def judge(rows, controls, bodies, table, options, forces, terms) -> None:
         control = controls[i]
         m = bodies[i].measured
         targets = targets_at(table, control, curves)
-        upright = m.base[1] >= scale.min_hip_height and abs(m.base[2]) <= MAX_PITCH  # False for NaN
-        terms[i, ALIVE] = 1.0 if upright and m.diverged < 0 else 0.0
+        terms[i, ALIVE] = 1.0 if is_alive(m, scale.min_hip_height) else 0.0
         x, z, speed = error_of(control, targets, m)
         terms[i, COM_X] = exp(-((x / scale.tolerance[0]) ** 2))
         terms[i, COM_Z] = exp(-((z / scale.tolerance[1]) ** 2))
@@ -292,7 +284,7 @@ def total(terms, options, reward) -> None:
 
 
 class Task:
-    """Observation, reward and falls of N bodies.
+    """Observation and reward of N bodies.
 
     Args:
         settings: the weights of the reward, and the time of a step.
@@ -364,15 +356,3 @@ class Task:
     def planned_com(self, bodies: NDArray) -> NDArray:
         """Return the plan's CoM (x in the world, z) [m], shape (N, 2); `bodies` (N,) of `BODY_ROW`."""
         return bodies["measured"]["com"] - self.tracking(bodies)[:, :2]
-
-    def reasons(self, m: "Measurement", terminated: NDArray) -> NDArray:
-        """Return (N,) the reason why an episode is `terminated` (N,), as codes of `TERMINATIONS`."""
-        reasons = np.where(terminated, self.fallen(m), 0)
-        for index in np.flatnonzero(terminated & (m.diverged >= 0)).tolist():
-            reasons[index] = divergence(m, index)
-        return reasons
-
-    def fallen(self, m: "Measurement") -> NDArray:
-        """Return (N,) the reason of each body's fall, as codes of `TERMINATIONS`; 0 without one."""
-        tilted = np.where(np.abs(m.base[:, 2]) <= MAX_PITCH, 0, TOO_TILTED)
-        return np.where(m.base[:, 1] >= self.rows["scales"]["min_hip_height"], tilted, TOO_LOW)

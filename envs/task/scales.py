@@ -9,9 +9,8 @@ from springfoot.arrays import NDArray
 from springfoot.gait.body.body import GRAVITY, Body
 
 from ..physics.model import ANKLE, HIP, JOINTS, KNEE, TOE
+from .episode_end import MIN_HIP_HEIGHT
 
-MIN_HIP_HEIGHT = 0.65
-"""Lowest hip before it counts as a fall [m at 1.70 m, scaled with height]; chosen: in walking it stays above 0.83 m."""
 COM_X_TOLERANCE, COM_Z_TOLERANCE = 0.03, 0.015
 """Error of the CoM, forward and up, at which its reward is 1/e [m at 1.70 m, scaled with height]; chosen."""
 COP_TOLERANCE = 0.04

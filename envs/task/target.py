@@ -60,13 +60,14 @@ def targets_at(table, control, curves) -> NDArray:
     """Return the target at the present phases of both legs, (side,) of `TARGET`.
 
     Args:
-        table: (R, SAMPLES, 2, C) of `TARGET`, of a `PhaseTable`.
+        table: (R, SAMPLES, 2, C) of a `PhaseTable`: R variants and speeds of the walk, C curves, the numbers of
+            `TARGET`.
         control: one of `CONTROL_ROW`.
         curves: (side, C) memory, which is filled; the target is a view of it.
     """
     for side in range(2):
         read(table, control.subject.place, control.legs.phase[side], curves[side])
-    return curves.view(TARGET)[:, 0]
+    return curves.view(TARGET)[:, 0]  # (side, 1) records of C numbers each, without the axis of length 1
 
 
 @part

@@ -84,7 +84,8 @@ class LiveScene:
         self._bodies = {body: scene.add_frame(_name(body), show_axes=False) for body in range(1, model.nbody)}
         for geom in np.flatnonzero(model.geom_bodyid).tolist():  # body 0 is the world, whose ground is drawn as a grid
             self._add_geom(geom)
-        turn = -np.radians(self._session.wishes.slope_deg) / 2  # half the angle, for a quaternion
+        # Half the angle, for a quaternion; negative, as a positive turn about y moves forward (x) down.
+        turn = -np.radians(self._session.wishes.slope_deg) / 2
         self._ground = scene.add_line_segments(
             "/ground",
             _grid(),

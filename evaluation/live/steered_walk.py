@@ -17,8 +17,8 @@ from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.batch.step_result import Tick
 from springfoot.envs.batch.walk import Walked, walked_steps
 from springfoot.envs.control.equilibrium import foot_curves
-from springfoot.envs.control.foot_springs import FEET, action_of, stiffness_of
 from springfoot.envs.control.reference_walk import reference_walk_at, rows, tabulated_speeds
+from springfoot.envs.control.stiffness_control import FEET, action_of, stiffness_of
 from springfoot.envs.physics.model import SIDES
 from springfoot.envs.physics.simulation import MjData, MjModel
 from springfoot.envs.settings.checks import LONGEST_EPISODE

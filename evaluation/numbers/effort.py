@@ -89,23 +89,32 @@ def effort_numbers(episodes: Sequence[EpisodeEffort], body: Body) -> dict[str, A
     """Return `effort` of metrics.json, nested as in docs/reference/metrics.md; None for numbers of a body that does not
     move forward."""
     effort = mean_effort(episodes, body)
+    if effort is None:
+        nothing = dict.fromkeys(("fibre_J_kg_m", "net_joint_J_kg_m", "activation"))
+        return {
+            **nothing,
+            **dict.fromkeys(("rate", "acceleration", "total")),
+            "per_joint": dict.fromkeys(JOINTS, nothing),
+            "per_leg": dict.fromkeys(SIDES, nothing),
+        }
     total = _Total.of(episodes)
-    per_metre = 1.0 / (body.mass * total.distance) if effort else np.nan
+    # Of the body alone, as people's costs are told; `mean_effort` has the weight with load, which the muscles carry.
+    per_kg_and_metre = 1.0 / (body.mass * total.distance)
 
-    def numbers_of(energy: NDArray, net_energy: NDArray, activation: NDArray) -> dict[str, float | None]:
+    def numbers_of(energy: NDArray, net_energy: NDArray, activation: NDArray) -> dict[str, float]:
         """Return the numbers of the legs and joints whose sums over the episodes are given."""
         return {
-            "fibre_J_kg_m": float(energy.sum() * per_metre) if effort else None,
-            "net_joint_J_kg_m": float(net_energy.sum() * per_metre) if effort else None,
-            "activation": float(activation.sum() / total.seconds) if effort else None,
+            "fibre_J_kg_m": float(energy.sum() * per_kg_and_metre),
+            "net_joint_J_kg_m": float(net_energy.sum() * per_kg_and_metre),
+            "activation": float(activation.sum() / total.seconds),
         }
 
     parts = total.energy, total.net_energy, total.activation
     return {
         **numbers_of(*parts),
-        "rate": effort and effort.rate,
-        "acceleration": effort and effort.acceleration,
-        "total": effort and effort.total,
+        "rate": effort.rate,
+        "acceleration": effort.acceleration,
+        "total": effort.total,
         "per_joint": {joint: numbers_of(*(part[:, index] for part in parts)) for index, joint in enumerate(JOINTS)},
         "per_leg": {side: numbers_of(*(part[index] for part in parts)) for index, side in enumerate(SIDES)},
     }

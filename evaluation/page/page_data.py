@@ -104,15 +104,14 @@ def _people_curve(human: HumanGait, name: str, degrees: bool = False) -> dict[st
 def _angles(gait: Gait, human: HumanGait, by_leg: bool) -> list[dict[str, Any]]:
     """Return the panels of joint angles, the legs' own curves in them if `by_leg`."""
     positive = {"ankle": "dorsiflexion", "toe": "up"}
-    return [
-        _panel(
-            *("Angles", f"{joint.capitalize()} angle", f"{positive.get(joint, 'flexion')}, deg"),
-            _mean_and_sd(gait.both, column),
-            **_people_curve(human, joint, degrees=True),
-            **_leg_curves(gait, column, by_leg),
-        )
-        for joint, column in ANGLE_COLUMNS.items()
-    ]
+    panels = []
+    for joint, column in ANGLE_COLUMNS.items():
+        title = f"{joint.capitalize()} angle"
+        unit = f"{positive.get(joint, 'flexion')}, deg"
+        people = _people_curve(human, joint, degrees=True)
+        legs = _leg_curves(gait, column, by_leg)
+        panels.append(_panel("Angles", title, unit, _mean_and_sd(gait.both, column), **people, **legs))
+    return panels
 
 
 def _kinetics(gait: Gait, human: HumanGait, by_leg: bool) -> list[dict[str, Any]]:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from springfoot.arrays import NDArray
-from springfoot.envs.control.foot_springs import stiffness_ranges
+from springfoot.envs.control.stiffness_control import stiffness_ranges
 from springfoot.envs.physics.contact import contact_offsets
 from springfoot.envs.physics.foot import LOCK, FootJoint
 from springfoot.envs.physics.model import SIDES

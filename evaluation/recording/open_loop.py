@@ -131,9 +131,10 @@ def feedback(recording: Recording) -> dict[str, dict[str, float | None]]:
     """Return `feedback` of metrics.json: the variation of log K of ankle and toe that the phase does not explain.
 
     `share` is the fraction of the variance that is left at equal phase [0, 1], `spread` the standard deviation at equal
-    phase (0.1: K varies by 10 %); both are None without K. The variance at equal phase is half the mean squared
-    difference of neighbours in phase (Rice, Annals of Statistics 12 (1984) 1215), so that any schedule has none, with
-    or without steps. Legs with different feet have schedules of their own: the variances of each leg are averaged.
+    phase (0.1: K varies by 10 %); both are None if no group of legs has two decisions. The variance at equal phase is
+    half the mean squared difference of neighbours in phase (Rice, Annals of Statistics 12 (1984) 1215), so that a
+    schedule has next to none, be it smooth or constant but for jumps. Legs with different feet have schedules of their
+    own: the variances of each leg are averaged.
     """
     by_leg = [decisions_of(recording, legs) for legs in alike_legs(recording.settings)]
     # log K (n, 2) of each group of legs, in the order of the phase
@@ -143,6 +144,7 @@ def feedback(recording: Recording) -> dict[str, dict[str, float | None]]:
     totals = np.mean([logarithm.var(0) for logarithm in logarithms], axis=0)
     at_equal_phase = np.mean([0.5 * (np.diff(logarithm, axis=0) ** 2).mean(0) for logarithm in logarithms], axis=0)
     return {
+        # At most 1: where the phase explains nothing, neighbours differ by chance a little more than all decisions.
         joint: {"share": min(float(alike / total), 1.0) if total > SAME_K else 0.0, "spread": float(np.sqrt(alike))}
         for joint, total, alike in zip(SPRINGS, totals, at_equal_phase, strict=True)
     }

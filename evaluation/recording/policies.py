@@ -16,7 +16,7 @@ from springfoot.agents.policies.baselines import (
 )
 from springfoot.agents.policies.foreign import is_function
 from springfoot.agents.policies.policy import OF_FEET, SHIPPED, load_policy
-from springfoot.agents.policies.schedules import schedule_file
+from springfoot.agents.policies.schedule_files import schedule_file
 from springfoot.envs.settings.settings import CONDITION_SETTINGS, BipedSettings, settings_from, settings_to_json
 from springfoot.errors import SpringfootError
 

@@ -16,8 +16,8 @@ from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.batch.step_result import INFO, Tick
 from springfoot.envs.batch.walk import walked_steps
 from springfoot.envs.control.constants import LegConstants
-from springfoot.envs.control.foot_springs import FEET
 from springfoot.envs.control.reference_walk import reference_walk_at
+from springfoot.envs.control.stiffness_control import FEET
 from springfoot.envs.control.subjects import DRAWN
 from springfoot.envs.physics.contact import CONTACTS
 from springfoot.envs.physics.energy import ledger_entries

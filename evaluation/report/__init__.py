@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING
 from springfoot.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from .gait_figure import MODEL, PEOPLE, PLAN, STYLE
+    from .gait_figure import MODEL, PEOPLE, PLAN, PNG, STYLE
     from .gait_table import people_metrics
 
-__all__ = ["MODEL", "PEOPLE", "PLAN", "STYLE", "people_metrics"]
+__all__ = ["MODEL", "PEOPLE", "PLAN", "PNG", "STYLE", "people_metrics"]
 
 if not TYPE_CHECKING:  # a type checker would take it to mean that any name exists
     __getattr__ = lazy_names(
@@ -17,6 +17,7 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
             "MODEL": "gait_figure",
             "PEOPLE": "gait_figure",
             "PLAN": "gait_figure",
+            "PNG": "gait_figure",
             "STYLE": "gait_figure",
             "people_metrics": "gait_table",
         },

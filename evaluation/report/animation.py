@@ -6,7 +6,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from springfoot.arrays import NDArray
-from springfoot.envs.control.foot_springs import stiffness_ranges
+from springfoot.envs.control.stiffness_control import stiffness_ranges
 from springfoot.envs.physics.contact import contact_offsets
 from springfoot.envs.physics.model import ANKLE, HIP, KNEE, LEFT, RIGHT, TOE
 from springfoot.envs.settings.settings import body_of

@@ -27,6 +27,8 @@ PLAN = "#d1495b"
 PEOPLE = "#8a8a8a"
 Legs = tuple[tuple[StrideCurves, str], ...]
 """Drawn curves of the model and their colours: both feet together or, if they differ, left and right."""
+PNG: dict[str, Any] = {"facecolor": "white", "metadata": {"Software": "springfoot"}}
+"""Arguments of `savefig`. Matplotlib would put its version into the file: the same picture, but other bytes."""
 STYLE: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
     "font.size": 8.5,
@@ -68,7 +70,7 @@ def save_gait_figure(path: Path, recording: Recording, gait: Gait) -> None:
         for ax in [*grid[0], *grid[1], *grid[2, :2], *grid[3]]:
             _stride_axis(ax, metrics["toe_off_percent"], 100 * human.toe_off)
         _header(figure, recording, gait, human)
-        figure.savefig(path, dpi=130, facecolor="white", metadata={"Software": "springfoot"})
+        figure.savefig(path, dpi=130, **PNG)
 
 
 def _angle(ax: Axes, legs: Legs, human: HumanGait, joint: str, column: str, numbers: dict) -> None:

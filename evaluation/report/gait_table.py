@@ -151,6 +151,8 @@ def _sections(metrics: dict[str, Any]) -> list[list[TableRow]]:
     people = people_metrics(settings_from(**metrics["environment"]))
     grf = metrics["grf"]
     their_grf = people["grf"]
+    valley = grf["vertical_valley_bw"]
+    braking = grf["braking_peak_bw"]
     com = metrics["com"]
     zmp = metrics["zmp"]
     rest = metrics["came_to_rest"]
@@ -197,18 +199,10 @@ def _sections(metrics: dict[str, Any]) -> list[list[TableRow]]:
         ],
         [
             row("vertical force, peak 1", "BW", grf["vertical_peak1_bw"], ".2f", their_grf["vertical_peak1_bw"]),
-            row(
-                *("vertical force, valley", "BW", grf["vertical_valley_bw"], ".2f"),
-                their_grf["vertical_valley_bw"],
-                grf["vertical_r"],
-            ),
+            row("vertical force, valley", "BW", valley, ".2f", their_grf["vertical_valley_bw"], grf["vertical_r"]),
             row("vertical force, peak 2", "BW", grf["vertical_peak2_bw"], ".2f", their_grf["vertical_peak2_bw"]),
             row("vertical force, largest", "BW", grf["vertical_max_bw"], ".2f"),
-            row(
-                *("braking force", "BW", grf["braking_peak_bw"], ".2f"),
-                their_grf["braking_peak_bw"],
-                grf["forward_r"],
-            ),
+            row("braking force", "BW", braking, ".2f", their_grf["braking_peak_bw"], grf["forward_r"]),
             row("forward force", "BW", grf["forward_peak_bw"], ".2f", their_grf["forward_peak_bw"]),
         ],
         [

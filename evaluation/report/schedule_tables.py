@@ -1,6 +1,6 @@
 """Write a walk's springs as tables for a controller: K and theta_eq over the stride, and as a few finite states.
 
-Both are read back as policies (`springfoot.agents.policies.schedules`).
+Both are read back as policies (`springfoot.agents.policies.schedule_files`).
 """
 
 import json
@@ -13,8 +13,8 @@ import numpy as np
 
 from springfoot.arrays import NDArray
 from springfoot.envs.control.decision_times import gait_events
-from springfoot.envs.control.foot_springs import FEET
 from springfoot.envs.control.standing import steady_walk
+from springfoot.envs.control.stiffness_control import FEET
 from springfoot.envs.physics.model import SIDES, damping_times
 from springfoot.envs.settings.settings import body_of, reference_gait
 from springfoot.files.digest import BLANK_DIGEST, DIGEST, with_digest

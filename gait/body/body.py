@@ -153,7 +153,7 @@ class Body:
 
         Longer legs make it shorter by as much as they gain, so that all lengths add up to the height.
         """
-        return (0.288 - 0.49 * (self.leg_ratio - 1.0)) * self.height
+        return (0.288 - 0.49 * (self.leg_ratio - 1.0)) * self.height  # 0.49: thigh and shank of average legs
 
     # Masses -------------------------------------------------------------------------------------------------
 

@@ -202,9 +202,7 @@ def _plate_forces(plates: Iterable[Any], feet: Mapping[str, tuple], frames: int)
 
 def _per_frame(samples: NDArray, frames: int) -> NDArray:
     """Average a plate's samples (3, R x T), taken R a frame, around each of T frames: return (3, T)."""
-    ratio = max(
-        samples.shape[1] // max(frames, 1), 1
-    )  # R; 1 also for a file without frames, or a plate without samples
+    ratio = max(samples.shape[1] // max(frames, 1), 1)  # R; 1 also without frames, or for a plate without samples
     # The first sample is repeated half of R times, so that each mean has its frame in the middle.
     centred = np.pad(np.nan_to_num(samples), ((0, 0), (ratio // 2, 0)), mode="edge")
     cut = centred[:, : ratio * frames]

@@ -216,7 +216,8 @@ def _doubts_of_size(mean: Curves, sizes: Mapping[str, float]) -> Iterator[str]:
             high = ALONE
         if size > high or (size < low and not _may_be_small(curve, sizes)):
             if size == 0:
-                yield f"{COLUMNS[curve]} is {mean[curve][0] + 0.0:.3g} throughout the stride: was it measured?"
+                value = mean[curve][0] + 0.0  # no -0
+                yield f"{COLUMNS[curve]} is {value:.3g} throughout the stride: was it measured?"
                 continue
             least, most = _range_as_written(curve, mean[curve])
             yield (

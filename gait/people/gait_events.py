@@ -31,8 +31,8 @@ class Contacts:
     """Times (O,) at which the foot leaves the ground."""
 
     def strides(self, after: float = 0.0) -> NDArray:
-        """Return complete strides that begin at or after `after` [s]: (S, 3) heel strike, toe-off, next heel strike
-        [s]."""
+        """Return the S complete strides that begin at or after `after` [s]: (S, 3) heel strike, toe-off, next heel
+        strike [s]."""
         begin = self.heel_strikes[:-1]
         end = self.heel_strikes[1:]
         toe_off = next_after(self.toe_offs, begin)
@@ -64,7 +64,7 @@ def find_contacts(vertical_force: NDArray, tick: float, threshold: float, first:
 
 
 def find_steps(left: Contacts, right: Contacts, after: float = 0.0) -> tuple[NDArray, NDArray]:
-    """Return steps: from a heel strike to the next one, if that is the other foot's.
+    """Return the P steps: from a heel strike to the next one, if that is the other foot's.
 
     Returns times (P, 2) of both heel strikes [s] and the side (P,) of the first, 0 left, 1 right. Only steps that begin
     at or after `after` [s].
@@ -92,7 +92,7 @@ def sample(series: NDArray, times: NDArray, tick: float, first: float = 0.0) -> 
     before = np.minimum(position.astype(int), max(len(series) - 2, 0))  # 0 for a series of a single sample
     # One fraction a time, for all columns of the series.
     fraction = (position - before).reshape(position.shape + (1,) * (series.ndim - 1))
-    after = np.minimum(before + 1, len(series) - 1)
+    after = np.minimum(before + 1, len(series) - 1)  # the same one in a series of a single sample
     return series[before] * (1 - fraction) + series[after] * fraction
 
 

@@ -262,6 +262,7 @@ def harmonics(people: str | Path = PEOPLE_FILE) -> dict:
             table[kind] = {name: _series(name, table[kind][name], len(table["conditions"])) for name in COLUMNS}
         _require_numbers("cop: coefficient", table["cop"]["coefficients"], (-LARGEST_COEFFICIENT, LARGEST_COEFFICIENT))
         _require_habits(table["foot"])
+    # All that reading other contents raises; RecursionError: nested too deeply.
     except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
         raise SpringfootError(
             f"{people} must be a file of people's data as human_harmonics.json of springfoot.gait: {error}"

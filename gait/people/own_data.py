@@ -312,7 +312,7 @@ def _arrays_of(kind: str, rows: object) -> dict[str, NDArray]:
             raise SpringfootError(f"human {kind} has no curve {name!r:.40}; there are {', '.join(COLUMNS)}")
         try:
             array = np.array(values, float)
-        except (TypeError, ValueError, OverflowError):
+        except (TypeError, ValueError, OverflowError):  # no numbers, rows of unequal length, a number too large
             array = np.empty(0)
         # Forces have real coefficients (n,), other curves pairs of real and imaginary part (n, 2).
         shape_fits = array.ndim == 1 if name in FORCES else array.ndim == 2 and array.shape[1:] == (2,)

@@ -31,13 +31,16 @@ REST_SECONDS, REST_TRAVEL = 1.0, 0.01
 
 
 def rmse(curve: ArrayLike, reference: ArrayLike) -> float | None:
-    """Return the root mean square difference of two curves, in their unit; no offset removed."""
+    """Return the root mean square difference of two curves, in their unit; no offset removed.
+
+    None for curves without samples, and for values that are not finite.
+    """
     difference = np.asarray(curve, float) - np.asarray(reference, float)
     return _number(np.sqrt(np.mean(difference**2))) if difference.size else None
 
 
 def correlation(curve: ArrayLike, reference: ArrayLike) -> float | None:
-    """Return Pearson's r of two curves; None if either is constant."""
+    """Return Pearson's r of two curves; None if either is constant, or not finite."""
     a, b = (np.asarray(values, float) for values in (curve, reference))
     # A constant curve keeps rounding errors of 1e-16 of its mean, which must not pass for a shape.
     floor = 1e-12 * np.sqrt(np.sum(a * a) * np.sum(b * b))
@@ -48,7 +51,7 @@ def correlation(curve: ArrayLike, reference: ArrayLike) -> float | None:
 
 
 def share_within_sd(curve: ArrayLike, mean: ArrayLike, sd: ArrayLike) -> float | None:
-    """Return the percentage of the curve's samples inside mean ± sd."""
+    """Return the percentage of the curve's samples inside mean ± sd; None for a curve that is not finite."""
     inside = np.abs(np.asarray(curve, float) - np.asarray(mean)) <= np.asarray(sd)
     return _number(100 * np.mean(inside)) if np.all(np.isfinite(curve)) else None
 
@@ -129,7 +132,7 @@ def travel(position: NDArray, force: NDArray, least: float) -> float:
     counts only if the foot bears more than `least` [N] at both.
     """
     between = force[1:] + force[:-1]  # in each interval, twice the mean
-    fraction = between / np.maximum(between.sum(axis=1, keepdims=True), 1e-12)
+    fraction = between / np.maximum(between.sum(axis=1, keepdims=True), 1e-12)  # no division by 0 in the air
     loaded = force.sum(axis=1) > least
     return float(np.sum((np.abs(np.diff(position, axis=0)) * fraction)[loaded[1:] & loaded[:-1]]))
 

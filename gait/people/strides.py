@@ -46,7 +46,7 @@ class MeasuredWalk:
     tick: float
     """Time between samples [s]."""
     legs: dict[str, Series]
-    """Side -> curve -> (T,)."""
+    """Side -> curve -> its T samples, (T,)."""
     unscaled: set[tuple[str, str]]
     """(side, curve) of the curves in N, N m or W."""
     contacts: dict[str, Contacts]
@@ -116,8 +116,8 @@ def merge_trials(trials: Sequence[Trial]) -> MeasuredWalk:
 def cut_strides(walk: MeasuredWalk, side: str = "both", mass: float | None = None) -> tuple[NDArray, Series]:
     """Cut a walk into strides: return their events, and each curve over percent of the strides.
 
-    Events are times (S, 3) of heel strike, toe-off and next heel strike [s]. Curves are (strides that have it, 101), in
-    the units of `HumanGait`. `side` is both, left or right; `mass` [kg] as in `own_data.read_gait`. Raises
+    Events are times (S, 3) of heel strike, toe-off and next heel strike of S strides [s]. Curves are (strides that have
+    it, 101), in the units of `HumanGait`. `side` is both, left or right; `mass` [kg] as in `own_data.read_gait`. Raises
     `SpringfootError` for too few strides.
     """
     chosen = {name: leg for name, leg in walk.legs.items() if side in ("both", name)}

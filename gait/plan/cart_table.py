@@ -176,9 +176,8 @@ def closed_form(zmp: PPoly, step_length: float, height: float, slope: float = 0.
     for order in range(2, len(coefficients), 2):
         # An even derivative has `order` coefficients fewer, those of the highest powers, which come first.
         coefficients[order:] += zmp.derivative(order).c / rate**order
-    coefficients[-1] += (
-        height * back / down
-    )  # the constant terms, which are also the values at the starts of the pieces
+    # The constant terms, which are also the values at the starts of the pieces.
+    coefficients[-1] += height * back / down
     polynomial = PPoly(coefficients, zmp.x)
 
     # Jumps of the polynomials, in x and in x' / rate, from the end of each piece to the start of the next: the

@@ -94,6 +94,7 @@ def over_peoples_zmp(plan: ComPlan) -> ComPlan:
     Double support lasts `PEOPLES_SHARE` of that of `plan.human`. In single support the ZMP runs straight along
     `PEOPLES_ZMP`.
     """
+    # People's double support lasts 2 toe_off - 1 of a step: from a heel strike to the other foot's toe-off.
     double_support = PEOPLES_SHARE * (2 * plan.human.toe_off - 1) * plan.step_time
     zmp_from, zmp_to = np.array(PEOPLES_ZMP) * plan.body.length_scale
     motion = periodic_com(

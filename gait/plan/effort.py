@@ -131,7 +131,7 @@ class MuscleUse:
 def muscle_use(
     moment: NDArray, delivered: NDArray, tick: float, strength: NDArray, scale: float, muscle: Muscle = AS_IS
 ) -> MuscleUse:
-    """Compute the use of muscles over consecutive intervals, without the first and the last.
+    """Compute the use of the muscles of L legs over S consecutive intervals, without the first and the last.
 
     Args:
         moment: (S, L, 4) moment of the fibres, mean over each interval [N m], extension positive.
@@ -185,14 +185,15 @@ class Effort:
 
 
 def mean_squared_acceleration(velocity: NDArray, tick: float) -> float:
-    """Return `Effort.acceleration` of the joint velocities of L legs (S, L, 4) [rad/s] every `tick` [s]."""
+    """Return `Effort.acceleration` of S samples of the joint velocities of L legs, (S, L, 4) [rad/s], every `tick`
+    [s]."""
     # Without the toe, the last joint.
     change = np.diff(velocity[..., : JOINTS.index("toe")], axis=0) / tick
     return float(ACTIVATION_TIME**4 * (change**2).mean(0).sum())
 
 
 def beyond_range(angle: NDArray) -> float:
-    """Return `Effort.beyond_range` [deg] of joint angles (S, 4) [rad]."""
+    """Return `Effort.beyond_range` [deg] of S samples of a leg's joint angles, (S, 4) [rad]."""
     angle_deg = np.degrees(angle)
     beyond = 0.0
     for joint, (least, most) in MOTION_RANGE_DEG.items():
@@ -239,7 +240,7 @@ def effort_of_stride(
     """Compute the effort of a stride of `distance` [m] in `stride_time` [s] with equal legs, half a stride apart.
 
     Columns of `angle`, `rate` and `moment` (S, 4) are hip (thigh to the vertical), knee, ankle and toe of one leg, rows
-    even samples of the stride. Flexion and dorsiflexion [rad], [rad/s] are positive; in moments [N m] extension and
+    S even samples of the stride. Flexion and dorsiflexion [rad], [rad/s] are positive; in moments [N m] extension and
     plantarflexion.
     """
     tick = stride_time / len(angle)

@@ -264,9 +264,9 @@ def feet_under_zmp(
     toe_off = float(0.5 + zmp_times[1] / stride_time)
     # A style can only delay heel-off and hasten foot flat: the ZMP stays on the sole.
     if style is not None and style.heel_off is not None:
-        heel_off = max(heel_off, 0.5 - 0.5 * style.heel_off)
+        heel_off = max(heel_off, 0.5 - 0.5 * style.heel_off)  # the other foot lands at 0.5; a step is 0.5 of the stride
     if style is not None and style.flat is not None:
-        flat = min(flat, style.flat * (toe_off - 0.5))
+        flat = min(flat, style.flat * (toe_off - 0.5))  # double support is toe_off - 0.5 of the stride
     flat = max(float(flat), QUICKEST_FOOT_FLAT)
     # The ZMP leaves the tip of the rear foot in double support, more than half a stride after that foot's heel strike;
     # from the front foot the tip is a step behind.

@@ -107,7 +107,7 @@ def foot_force(plan: WalkPlan, stride_phase: ArrayLike) -> tuple[NDArray, NDArra
     pivot = np.stack(plan.pivot(step_phase), -1)
     force = ground_reaction(plan.body.total_mass, *plan.com_acceleration(step_phase), plan.slope)
     zmp = plan.zmp(step_phase)
-    double_support = step_phase <= 2 * plan.feet.toe_off - 1
+    double_support = step_phase <= 2 * plan.feet.toe_off - 1  # up to the rear foot's toe-off, in phases of the step
     rear, front = _double_support_cops(plan, step_phase)
     # In single support the stance foot is the front foot and bears the whole force, at the ZMP; the rear foot, without
     # force, may then be anywhere, 1 m behind.

@@ -170,6 +170,7 @@ def plan_walk(
     weightless = GRAVITY * cos(slope) * (step_time / (2 * pi)) ** 2
     if com_amplitude is None:
         rise = RISE if style is None else style.rise
+        # 16 = 2 x 8: the amplitude is half of the rise and fall, and `RISE` is over step_length^2 / (8 leg_length).
         com_amplitude = min(rise * step_length**2 / (16 * body.leg_length), MOST_UNLOADING * weightless)
     com_amplitude = require_within("com_amplitude", com_amplitude, (0.0, 0.9 * weightless), "m")
     if com_height is not None:
@@ -280,7 +281,7 @@ def _refuse_zmp_outside(plan: WalkPlan) -> None:
     rear, front = plan.support(phase)
     zmp = plan.zmp(phase)
     beyond = np.maximum(rear - zmp, zmp - front)
-    if beyond.max() > 1e-6:
+    if beyond.max() > 1e-6:  # [m]; a ZMP at an edge may err by rounding
         raise SpringfootError(
             f"ZMP outside the feet by {beyond.max():.4f} m at {phase[beyond.argmax()]:.0%} of the step"
         )

@@ -34,7 +34,8 @@ def leg_angles(
 ) -> tuple[NDArray, NDArray]:
     """Return thigh (to the vertical) and knee angle [rad], flexion positive, by leg inverse kinematics.
 
-    The ankle is `forward` of and `down` from the hip [m]. An ankle out of reach gets a straight knee.
+    The ankle is `forward` of and `down` from the hip [m]. An ankle out of reach gets a straight knee, one too near a
+    knee flexed by pi.
     """
     square = np.square(forward) + np.square(down)
     # The knee by the law of cosines; the flexed knee puts the thigh ahead of the line from hip to ankle, by `lead`.
@@ -136,7 +137,7 @@ def legs_under(
     trunk = hypot(*body.upper_moment) / body.total_mass  # shift of the body's CoM from the hip by trunk and load [m]
     # Fixed point: place the legs below the hip, then move the hip so that the CoM is right. A shift of the hip moves
     # the legs' masses, which shift the hip by a third as much the next time: the search converges quickly.
-    for _ in range(60):
+    for _ in range(60):  # some 25 are enough
         forward = ankle[0] - hip[0]
         down = hip[1] - ankle[1]
         thigh, knee = leg_angles(forward, down, body.thigh_length, body.shank_length)

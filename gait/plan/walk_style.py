@@ -100,7 +100,7 @@ def least_work(speed: float, file: Path | None = None) -> WalkStyle:
     speeds = sorted(table)
     position = float(np.interp(speed, speeds, np.arange(len(speeds))))  # 1.25: a quarter from speed 1 to speed 2
     low = table[speeds[int(position)]]
-    high = table[speeds[min(int(position) + 1, len(speeds) - 1)]]
+    high = table[speeds[min(int(position) + 1, len(speeds) - 1)]]  # the last speed has no next one
     return style_from(_interpolate(low.to_json(), high.to_json(), position - int(position)))
 
 
@@ -129,6 +129,7 @@ def styles_of(file: Path) -> dict[float, WalkStyle]:
     try:
         styles = json.loads(read_bytes(file, MOST_JSON_BYTES))["styles"]
         by_speed = {float(speed): style_from(values) for speed, values in styles.items()}
+    # All that reading other contents raises; RecursionError: nested too deeply.
     except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
         raise SpringfootError(f"{file} is not a file of styles of walks: {error}") from None
     if not by_speed:

@@ -178,7 +178,7 @@ def _phase_spring(data: _Data, low: float, high: float, margin: float, spacing: 
     trial = np.unique(data.trial[inside], return_inverse=True)[1]
     trials = int(trial.max()) + 1 if len(trial) else 0
     common = {"start": low, "end": high, "samples": len(inside), "trials": trials}
-    # Further states: the given ones and two curvatures.
+    # Further states: the given ones and two curvatures. Their test needs more trials than states; here twice as many.
     needed = max(LEAST_TRIALS, 2 * (data.states.shape[1] + 2))
     if trials < needed:
         return _unknown_spring(common, f"{trials} trials are too few, {needed} are needed")

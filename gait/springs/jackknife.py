@@ -51,7 +51,7 @@ class TrialFit(NamedTuple):
         # The jackknife covariance, as the variance in `interval`.
         deviation = without - without.mean(0)
         covariance = self.inflation * (trials - 1) / trials * deviation.T @ deviation
-        squared = values @ np.linalg.pinv(covariance, hermitian=True) @ values
+        squared = values @ np.linalg.pinv(covariance, hermitian=True) @ values  # T^2, which scaled is distributed as F
         return float(fdtrc(count, trials - count, squared * (trials - count) / (count * (trials - 1))))
 
 
@@ -67,7 +67,7 @@ def fit_by_trial(columns: NDArray, values: NDArray, trial: NDArray, spent: int) 
     scale = np.sqrt((columns**2).mean(0))
     total_square = values @ values
     freedom = count - spent - unknowns
-    if not (scale > 1e-12).all() or freedom <= 0 or total_square == 0:
+    if not (scale > 1e-12).all() or freedom <= 0 or total_square == 0:  # 1e-12: a column of 0 but for rounding
         return None
     scaled = columns / scale
     order = np.argsort(trial, kind="stable")

@@ -35,7 +35,7 @@ class SpringFit(NamedTuple):
 
 
 def fit_spring(torque: NDArray, angle: NDArray, velocity: NDArray) -> SpringFit:
-    """Fit tau = a - K theta - c theta' to torque, angle and velocity (..., n) by least squares.
+    """Fit tau = a - K theta - c theta' to torque, angle and velocity (..., n), n > 3, by least squares.
 
     It works on deviations from the means, scaled to unit size, so that no digits are lost to units or offsets.
     """
@@ -43,12 +43,12 @@ def fit_spring(torque: NDArray, angle: NDArray, velocity: NDArray) -> SpringFit:
     mean = np.stack([angle.mean(-1), velocity.mean(-1)], -1)
     deviation = np.stack([angle, velocity], -1) - mean[..., None, :]
     scale = np.sqrt((deviation**2).mean(-2))
-    solvable = bool(np.all(scale > 1e-9 * (1 + np.abs(mean))))
-    scale = np.where(scale > 0, scale, 1.0)
+    solvable = bool(np.all(scale > 1e-9 * (1 + np.abs(mean))))  # angle and velocity vary by more than rounding
+    scale = np.where(scale > 0, scale, 1.0)  # no division by 0
     scaled = deviation / scale[..., None, :]
     # The normal equations X'X (K, c) = -X' torque, with the columns angle and velocity.
     gram = np.einsum("...ni,...nj->...ij", scaled, scaled)
-    solvable &= bool(np.all(np.linalg.det(gram) > 1e-10 * count**2))
+    solvable &= bool(np.all(np.linalg.det(gram) > 1e-10 * count**2))  # not the same curve twice, but for its size
     inverse = np.linalg.pinv(gram, hermitian=True) / scale[..., None, :] / scale[..., :, None]
     moment = np.einsum("...ni,...n->...i", deviation, torque - torque.mean(-1, keepdims=True))
     slopes = -np.einsum("...ij,...j->...i", inverse, moment)  # K, c
@@ -88,7 +88,7 @@ def intervals(fit: SpringFit) -> list[tuple[NDArray, NDArray, NDArray]]:
             square = K**2 - v[1, 1]
             centre = (numerator * K - v[index, 1]) / square
             product = (numerator**2 - v[index, index]) / square
-            half = np.sqrt(np.maximum(centre**2 - product, 0.0))
+            half = np.sqrt(np.maximum(centre**2 - product, 0.0))  # not below 0 by rounding
             bounded = square > 0
             low = np.where(bounded, centre - half, -np.inf)
             high = np.where(bounded, centre + half, np.inf)

@@ -205,7 +205,7 @@ def thesis_schedule(
     """
     human = human_gait(speed, body.height)
     scale = body.stiffness_scale
-    phase = np.linspace(0.0, human.toe_off, 1001)
+    phase = np.linspace(0.0, human.toe_off, 1001)  # every 0.1 % of stance
     # The data count plantarflexion positive, the joint dorsiflexion.
     torque = -human.mean("ankle_moment", phase) * body.total_mass * body.length_scale
     stance = schedule_from_curves(

@@ -203,7 +203,14 @@ class Predict(WalkingStudy):
     def _evaluate(self, found: Path, digest: str, policy: Path, settings: BipedSettings) -> str:
         """Walk with schedule and policy, undisturbed and pushed, and return the report's text.
 
-        `found` is the file of plan and constants; `digest` is that of its content, by which metrics are kept.
+        Both walk with the plan and the legs of the file `found`: the schedule, which is the search's own springs,
+        otherwise in the default settings, the policy in those of its training.
+
+        Args:
+            found: file of plan and constants.
+            digest: of their content. Metrics are kept, and measured anew for another digest or length of the training.
+            policy: run folder of the trained policy.
+            settings: environment of the training; the table has its people and its plan beside the walks.
         """
         walks = PushedWalks(
             episodes=self.episodes, seconds=self.seconds, push_newton=STAGE_PUSH, seed=self.seed, threads=self.threads

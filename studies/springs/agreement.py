@@ -25,7 +25,7 @@ from springfoot.arrays import NDArray
 from springfoot.errors import SpringfootError
 from springfoot.evaluation.numbers import HUMAN_LIKE, Gait, measure, number_text, with_derived
 from springfoot.evaluation.recording import policy_and_settings, policy_label, record
-from springfoot.evaluation.report import STYLE
+from springfoot.evaluation.report import PNG, STYLE
 from springfoot.files.markdown import MISSING, table
 from springfoot.files.writing import csv_text
 from springfoot.gait.people import PERCENT
@@ -215,7 +215,7 @@ def save_figure(path: Path, of_joints: Sequence[Agreement]) -> None:
         figure.legend(
             list(handles.values()), list(handles), loc="outside lower center", ncols=3, frameon=False, fontsize=9
         )
-        figure.savefig(path, dpi=110, facecolor="white", metadata={"Software": "springfoot"})
+        figure.savefig(path, dpi=110, **PNG)
 
 
 @dataclass(frozen=True, kw_only=True)

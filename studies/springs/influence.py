@@ -24,7 +24,7 @@ from springfoot.agents.policies import has_feedback
 from springfoot.envs.settings import BipedSettings, reference_gait
 from springfoot.errors import SpringfootError, require_count, require_number
 from springfoot.evaluation.recording import WARM_UP, policy_and_settings
-from springfoot.evaluation.report import MODEL, PEOPLE, PLAN, STYLE
+from springfoot.evaluation.report import MODEL, PEOPLE, PLAN, PNG, STYLE
 from springfoot.files.markdown import MISSING, table
 from springfoot.files.writing import csv_text
 from springfoot.gait.body import REFERENCE_HEIGHT
@@ -316,7 +316,7 @@ def save_influence_figure(path: Path, responses: Mapping[str, Response]) -> None
             ax.axvline(0, color="#555555", lw=0.8)
             ax.set_ylim(ROWS.min() - 0.6, ROWS.max() + 1.1)
         _draw_prediction(axes[5], responses)
-        figure.savefig(path, dpi=130, facecolor="white", metadata={"Software": "springfoot"})
+        figure.savefig(path, dpi=130, **PNG)
 
 
 def _bars(ax: Axes, response: Response, key: Key, label: str, title: str, unit: float = 1.0) -> None:

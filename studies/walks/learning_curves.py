@@ -18,7 +18,7 @@ from springfoot.agents.training import read_record
 from springfoot.errors import SpringfootError, require_count, require_number
 from springfoot.evaluation.numbers import WALKS, measure, unmet
 from springfoot.evaluation.recording import policy_and_settings, record
-from springfoot.evaluation.report import STYLE
+from springfoot.evaluation.report import PNG, STYLE
 from springfoot.files.markdown import MISSING, table
 from springfoot.files.writing import csv_text
 
@@ -41,7 +41,10 @@ def first_without_falls(evaluations: list[dict[str, Any]]) -> dict[str, Any] | N
 
 
 def save_curves(path: Path, runs: dict[str, dict[str, Any]]) -> None:
-    """Draw the return of the periodic evaluations over environment steps and over wall time, a line for each run."""
+    """Draw the return of the periodic evaluations over environment steps and over wall time, a line for each run.
+
+    `runs` is name -> record of a finished run (`read_finished`).
+    """
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(8.0, 3.0), layout="constrained")
         by_steps, by_time = figure.subplots(1, 2, sharey=True)
@@ -50,12 +53,10 @@ def save_curves(path: Path, runs: dict[str, dict[str, Any]]) -> None:
             returns = [entry["return_mean"] for entry in entries]
             by_steps.plot([entry["timesteps"] / 1e6 for entry in entries], returns, label=name)
             by_time.plot([entry["seconds"] for entry in entries], returns)
-        by_steps.set(
-            xlabel="environment steps (millions)", ylabel="return of an evaluation episode (10 s)", ylim=(0, None)
-        )
+        by_steps.set(xlabel="environment steps (millions)", ylabel="return of an evaluation episode", ylim=(0, None))
         by_time.set(xlabel="wall time (s)")
         by_steps.legend(frameon=False)
-        figure.savefig(path, dpi=110, facecolor="white", metadata={"Software": "springfoot"})
+        figure.savefig(path, dpi=110, **PNG)
 
 
 @dataclass(frozen=True, kw_only=True)

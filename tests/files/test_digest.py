@@ -8,7 +8,7 @@ import zipfile
 import numpy as np
 import pytest
 
-from springfoot.agents.policies.schedules import schedule_file
+from springfoot.agents.policies.schedule_files import schedule_file
 from springfoot.envs import BipedSettings
 from springfoot.envs.control.constants import leg_constants
 from springfoot.evaluation.recording.policies import policy_and_settings

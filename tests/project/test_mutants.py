@@ -140,7 +140,7 @@ def test_lines_of_compiled_kernels_count_where_they_are_called(tmp_path):
 from benchmarks import executed_lines
 executed_lines.start()
 import numpy as np
-from springfoot.envs.control import foot_springs
+from springfoot.envs.control import stiffness_control
 from springfoot.envs.control.phase_table import SAMPLES, PhaseTable
 PhaseTable(np.zeros((SAMPLES, 2))).at(np.array([0.5]))
 """
@@ -153,7 +153,7 @@ PhaseTable(np.zeros((SAMPLES, 2))).at(np.array([0.5]))
         sites = [site for site in sites_of((ROOT / file).read_text(), file) if site.mutant.function == function]
         return [not set(site.lines).isdisjoint(lines[file]) for site in sites]
 
-    table, springs = "envs/control/phase_table.py", "envs/control/foot_springs.py"
+    table, springs = "envs/control/phase_table.py", "envs/control/stiffness_control.py"
     assert all(executed(table, "PhaseTable.__init__")) and all(executed(table, "_read_all"))
     assert all(executed(table, "read"))  # which is called by a kernel alone
     assert executed(springs, "move") and not any(executed(springs, "move"))

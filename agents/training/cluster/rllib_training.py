@@ -195,11 +195,12 @@ class _Run:
 
     def _connect(self, stack: ExitStack) -> None:
         """Join or start a Ray cluster until `stack` is closed, and decide the number of runners."""
+        # A processor for each runner, and one for this process, which learns.
         stack.enter_context(joined(None if self._runners is None else max(self._runners + 1, processors())))
         if self._runners is None:
             self._runners = max(1, int(ray.cluster_resources().get("CPU", 2)) - 1)
         require_count("num_env_runners", self._runners, 0)
-        if self._config.num_envs % max(1, self._runners):
+        if self._config.num_envs % max(1, self._runners):  # 0 runners: this process collects
             raise SpringfootError(
                 f"num_envs must be a multiple of the {self._runners} runners, got {self._config.num_envs}"
             )
@@ -328,11 +329,11 @@ class _Run:
         write_atomically(unfinished / _RECORD, object_with_digest(past))
         if (self._out / BEST).is_file():
             shutil.copyfile(self._out / BEST, unfinished / BEST)
-        shutil.rmtree(checkpoint, ignore_errors=True)
+        shutil.rmtree(checkpoint, ignore_errors=True)  # most often there is none of the same timesteps
         unfinished.rename(checkpoint)
         for path in self._out.glob(f"{CHECKPOINT}*"):
             if path != checkpoint:
-                shutil.rmtree(path, ignore_errors=True)
+                shutil.rmtree(path, ignore_errors=True)  # what is left costs no more than space
         self._write_record("running")
 
     def _seconds(self) -> float:

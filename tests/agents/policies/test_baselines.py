@@ -6,7 +6,7 @@ import pytest
 from springfoot.agents.policies.baselines import BASELINES, baseline, leg_phase, own_settings, schedule
 from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.control.equilibrium import REFERENCE_STIFFNESS
-from springfoot.envs.control.foot_springs import stiffness_of
+from springfoot.envs.control.stiffness_control import stiffness_of
 from springfoot.envs.settings.settings import BipedSettings, settings_from
 from springfoot.envs.task.observation_entries import OBSERVATION
 from springfoot.evaluation.recording.recording import record

@@ -5,7 +5,7 @@ import pytest
 
 from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.batch.step_result import Tick
-from springfoot.envs.control.foot_springs import FEET, action_of
+from springfoot.envs.control.stiffness_control import FEET, action_of
 from springfoot.envs.physics.model import DAMPING_TIME, SIDES, torque_limits
 from springfoot.envs.settings.settings import BipedSettings, settings_from
 from springfoot.errors import SpringfootError

@@ -10,8 +10,8 @@ from springfoot.agents.training.ppo import Learner
 from springfoot.agents.training.sb3_vec_env import SegmentedFootBipedVecEnv
 from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.control.decision_times import gait_events
-from springfoot.envs.control.foot_springs import stiffness_of
 from springfoot.envs.control.phase_table import GRID
+from springfoot.envs.control.stiffness_control import stiffness_of
 from springfoot.envs.settings.settings import BipedSettings, settings_from, settings_to_json
 from springfoot.evaluation.recording.recording import record
 from springfoot.gait.body.body import Body

@@ -10,7 +10,7 @@ from walked_ticks import walked_ticks
 from springfoot.arrays import NDArray
 from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.batch.step_result import Tick
-from springfoot.envs.control.foot_springs import FEET
+from springfoot.envs.control.stiffness_control import FEET
 from springfoot.envs.physics.energy import LEDGER
 from springfoot.envs.physics.foot import SOUND, WAYS, total_mass
 from springfoot.envs.physics.measurement import segments_of

@@ -10,10 +10,10 @@ from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.batch.step_result import INFO, Tick
 from springfoot.envs.control.constants import slope_constants
 from springfoot.envs.control.equilibrium import foot_curves
-from springfoot.envs.control.foot_springs import FootSprings, action_of, move
 from springfoot.envs.control.legs import LegController, drive, slope_table
 from springfoot.envs.control.reference_walk import rows as rows_of
 from springfoot.envs.control.reference_walk import tabulated_speeds
+from springfoot.envs.control.stiffness_control import FootSprings, action_of, move
 from springfoot.envs.control.subjects import Subjects
 from springfoot.envs.env import SegmentedFootBiped
 from springfoot.envs.physics.model import JOINTS, SIDES

@@ -6,7 +6,7 @@ import pytest
 
 from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.batch.step_result import Tick
-from springfoot.envs.control.foot_springs import FEET, action_of
+from springfoot.envs.control.stiffness_control import FEET, action_of
 from springfoot.envs.physics.contact import FRICTION
 from springfoot.envs.physics.measurement import Measurement, measure_bodies
 from springfoot.envs.physics.model import ANKLE, SIDES, build_spec

@@ -12,7 +12,7 @@ from walked_ticks import walked_ticks
 from springfoot.cli.evaluate import evaluate_main
 from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.batch.step_result import Tick
-from springfoot.envs.control.foot_springs import FEET
+from springfoot.envs.control.stiffness_control import FEET
 from springfoot.envs.physics.model import ANKLE
 from springfoot.envs.settings.settings import settings_from, settings_to_json
 from springfoot.errors import SpringfootError

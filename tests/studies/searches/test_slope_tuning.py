@@ -10,7 +10,7 @@ import pytest
 from springfoot.cli.main import study_main
 from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.control.constants import slope_constants
-from springfoot.envs.control.foot_springs import action_of
+from springfoot.envs.control.stiffness_control import action_of
 from springfoot.envs.settings.settings import BipedSettings
 from springfoot.studies.searches import slope_tuning as slopes
 

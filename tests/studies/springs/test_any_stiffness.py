@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from springfoot.cli.main import study_main
-from springfoot.envs.control.foot_springs import FEET
+from springfoot.envs.control.stiffness_control import FEET
 from springfoot.envs.physics.model import damping_times
 from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.evaluation.recording.recording import record

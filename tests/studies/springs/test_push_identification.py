@@ -7,7 +7,7 @@ import pytest
 
 from springfoot.cli.main import study_main
 from springfoot.envs.control.constants import leg_constants
-from springfoot.envs.control.foot_springs import FEET
+from springfoot.envs.control.stiffness_control import FEET
 from springfoot.envs.physics.model import damping_times
 from springfoot.envs.settings.settings import body_of
 from springfoot.evaluation.recording.policies import policy_and_settings

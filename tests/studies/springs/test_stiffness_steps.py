@@ -10,7 +10,7 @@ import pytest
 
 from springfoot.agents.policies.baselines import leg_phase
 from springfoot.envs.batch.biped_batch import Biped
-from springfoot.envs.control.foot_springs import FEET, action_of, stiffness_of
+from springfoot.envs.control.stiffness_control import FEET, action_of, stiffness_of
 from springfoot.envs.physics.model import JOINTS, SIDES, damping_times
 from springfoot.envs.settings.settings import BipedSettings
 from springfoot.evaluation.recording.policies import policy_and_settings

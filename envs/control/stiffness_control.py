@@ -1,8 +1,9 @@
 """Turn actions into stiffness, and stiffness into control of ankle and toe: tau = K (theta_eq - theta - beta
 dtheta/dt).
 
-The springs of muscles have the K of the actions or of the schedule; a device in their place has its own, always. Arrays
-(side, 2) have ankle and toe along the last axis; flattened, they are in the order of `ACTIONS`.
+The springs of muscles have the K of the actions or of the schedule; a device in their place, such as a passive
+prosthetic foot, has its own, always: `foot_rows` has these springs, `envs.settings.feet` their numbers. Arrays (side,
+2) have ankle and toe along the last axis; flattened, they are in the order of `ACTIONS`.
 """
 
 from collections.abc import Sequence

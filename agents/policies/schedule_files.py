@@ -12,8 +12,8 @@ from typing import Any, get_args
 import numpy as np
 
 from springfoot.arrays import NDArray
-from springfoot.envs.control.foot_springs import FEET
 from springfoot.envs.control.phase_table import GRID
+from springfoot.envs.control.stiffness_control import FEET
 from springfoot.envs.physics.model import SIDES, damping_times
 from springfoot.envs.settings.settings import BipedSettings, Equilibrium, body_of
 from springfoot.errors import SpringfootError, as_float, require_number, require_within
@@ -183,7 +183,7 @@ def _states(path: Path, settings: BipedSettings) -> StiffnessSchedule:
         entries = [
             [(state["phase"], *(state[joint].get(key) for key in SPRING_KEYS)) for joint in SPRINGS] for state in states
         ]
-    except (LookupError, TypeError, AttributeError):
+    except (LookupError, TypeError, AttributeError):  # an entry is missing, or a list or a number in place of an object
         raise SpringfootError(
             f"{path} is no {STATES_FILE}: an object with states, a list in which each has phase, ankle and "
             f"toe, and these {', '.join(SPRING_KEYS)}"

@@ -5,9 +5,16 @@ import pytest
 from numpy.typing import NDArray
 
 from springfoot.envs.control.constants import slope_constants
-from springfoot.envs.control.foot_springs import FootSprings, action_of, move, stiffen, stiffness_of, stiffness_ranges
 from springfoot.envs.control.legs import slope_table
 from springfoot.envs.control.phase_table import GRID, PLACE, SAMPLES, PhaseTable
+from springfoot.envs.control.stiffness_control import (
+    FootSprings,
+    action_of,
+    move,
+    stiffen,
+    stiffness_of,
+    stiffness_ranges,
+)
 from springfoot.envs.control.subjects import Subjects
 from springfoot.envs.physics.measurement import BODY_ROW
 from springfoot.envs.physics.model import JOINTS, SIDES
