@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 import tyro
 
-from springfoot.agents.training.config import PRESETS, TrainingConfig
+from springfoot.agents.training.config import PRESETS, TrainingConfig, require_not_mirrored
 from springfoot.command_line import end_in_order, exit_code, parse, stopped_by
 from springfoot.envs.settings.settings import BipedSettings, settings_from, settings_to_json
 from springfoot.errors import MOST_THREADS, SpringfootError, require_count
@@ -131,6 +131,7 @@ def _train(flags: TrainFlags, config: TrainingConfig) -> dict[str, Any]:
     """Train a new run of `config` with the engine of the flags; return the content of its run.json."""
     assert flags.out is not None
     if flags.engine == "rllib":
+        require_not_mirrored(config)
         return _engine(rllib=True).train(config, flags.out, flags.num_env_runners)
     return _engine(rllib=False).train(config, flags.out)
 

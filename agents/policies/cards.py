@@ -33,11 +33,13 @@ def policy_card(name: str) -> str:
     purpose, command, page = MADE.get(name) or _of_a_foot(name)
     defaults = settings_to_json(BipedSettings())
     changed = {key: value for key, value in settings_to_json(policy.settings).items() if value != defaults[key]}
+    layers = " - ".join(map(str, policy.layer_sizes))
     differences = ", ".join(f"{key} {value}" for key, value in changed.items())
+    legs = ", for each leg, the right one's mirrored" if policy.mirror is not None else ""
     lines = [
         f"made by: `{command}`",
         f"results and falls: docs/results/{page}.md",
-        f"network: {' - '.join(map(str, policy.layer_sizes))}, {policy.activation}; observations to four stiffnesses",
+        f"network: {layers}, {policy.activation}{legs}; observations to four stiffnesses",
         f"settings of its training, where not the defaults: {differences or 'none'}",
         f"limits: {SHARED_LIMITS}",
         f"SHA-256: `{sha256(read_bytes(find_policy(name))).hexdigest()}`",

@@ -14,6 +14,7 @@ from gymnasium import ObservationWrapper
 from springfoot.arrays import NDArray
 from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.settings.settings import BipedSettings, settings_from
+from springfoot.envs.task.mirror import Mirror, mirror_of
 from springfoot.errors import SpringfootError, require_number
 
 from .fingerprint import fingerprint
@@ -43,6 +44,7 @@ def policy_from_mlp(
     observation_variance: Any = None,
     observation_clip: float | None = None,
     variance_floor: float = VARIANCE_FLOOR,
+    mirrored: bool = False,
 ) -> Policy:
     """Return a policy from the weights of a multilayer perceptron that gives the mean action.
 
@@ -55,6 +57,8 @@ def policy_from_mlp(
         observation_variance: (D,) variance whose root divided observations in training.
         observation_clip: largest magnitude of a normalised observation; None for no limit.
         variance_floor: added to the variance before the root.
+        mirrored: True if the layers lead to the actions of the left leg alone, (2,): the policy takes those of the
+            right leg from the mirrored observation.
 
     Raises `SpringfootError`, one line, for widths that do not lead from observation to action, an unknown activation
     and numbers that are not finite.
@@ -75,7 +79,8 @@ def policy_from_mlp(
         observation_variance = np.ones(width)
         variance_floor = 0.0
     require_number("variance_floor", variance_floor, 0)
-    weights, biases = _checked_layers(layers, width, len(biped.action_names))
+    mirror = mirror_of(biped.observation_names, biped.action_names) if mirrored else None
+    weights, biases = _checked_layers(layers, width, len(biped.action_names), mirrored)
     mean = _array("observation_mean", observation_mean)
     variance = _array("observation_variance", observation_variance)
     for name, value in (("observation_mean", mean), ("observation_variance", variance)):
@@ -94,6 +99,7 @@ def policy_from_mlp(
         variance_floor=float(variance_floor),
         activation=activation,
         output=output,
+        mirror=mirror,
     )
 
 
@@ -131,7 +137,13 @@ def policy_from_sb3(
     if not ((low == -1).all() and (high == 1).all()):
         raise SpringfootError("the model acts on another range than [-1, 1]: a wrapper rescales the actions")
     layers, activation, output = actor_of(model.policy)
-    policy = policy_from_mlp(layers, settings, activation=activation, output=output, **statistics_of(normalizer))
+    mirror = getattr(model.policy, "mirror", None)  # of a MirroredNetwork
+    statistics = statistics_of(normalizer)
+    if mirror is not None and not _alike(mirror, **statistics):
+        raise SpringfootError("its network is mirrored, but its VecNormalize treats left and right differently")
+    policy = policy_from_mlp(
+        layers, settings, activation=activation, output=output, mirrored=mirror is not None, **statistics
+    )
     if model.get_env() is not None and any(model.get_env().env_is_wrapped(ObservationWrapper)):
         raise SpringfootError(
             "a wrapper changes the observations before the model sees them: train with VecNormalize instead, "
@@ -184,6 +196,12 @@ def actor_of(network: Any) -> tuple[Layers, str, Output]:
     return [(layer.weight, layer.bias) for layer in layers], names[activations.pop()], output
 
 
+def _alike(mirror: Mirror, observation_mean: Any = 0.0, observation_variance: Any = 1.0, **_: Any) -> bool:
+    """Return True if the statistics of observations, as of `statistics_of`, are those of the mirrored ones."""
+    mean, variance = (np.broadcast_to(value, len(mirror.index)) for value in (observation_mean, observation_variance))
+    return np.array_equal(mirror.of(mean), mean) and np.array_equal(variance[mirror.index], variance)
+
+
 def statistics_of(normalizer: Any) -> dict[str, Any]:
     """Return the statistics of a `VecNormalize` as keyword arguments of `policy_from_mlp`; {} for None, or if it does
     not normalise observations."""
@@ -198,12 +216,12 @@ def statistics_of(normalizer: Any) -> dict[str, Any]:
 
 
 def _checked_layers(
-    layers: Layers, observation_entries: int, actions: int
+    layers: Layers, observation_entries: int, actions: int, mirrored: bool
 ) -> tuple[tuple[NDArray, ...], tuple[NDArray, ...]]:
     """Return the weights (outputs, inputs) and the biases (outputs,) of all layers as arrays, 0 for a bias of None.
 
     Raises `SpringfootError` unless the first layer takes `observation_entries` numbers, each other layer the outputs of
-    the one before, and the last one returns `actions` numbers.
+    the one before, and the last one returns `actions` numbers; half of them if `mirrored`.
     """
     weights = []
     biases = []
@@ -220,8 +238,10 @@ def _checked_layers(
         weights.append(w)
         biases.append(b)
         inputs = len(w)
-    if not weights or inputs != actions:
-        raise SpringfootError(f"the last layer must have {actions} outputs, one for each action, has {inputs}")
+    outputs = actions // 2 if mirrored else actions
+    if not weights or inputs != outputs:
+        of_leg = " of the left leg" if mirrored else ""
+        raise SpringfootError(f"the last layer must have {outputs} outputs, one for each action{of_leg}, has {inputs}")
     return tuple(weights), tuple(biases)
 
 

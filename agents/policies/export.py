@@ -217,19 +217,32 @@ def onnx_bytes(policy: Policy, scale: Scale, contract: str) -> bytes:
     def clip(x: str, limit: float, name: str = "") -> str:
         return node("Clip", x, constant(-limit), constant(limit), name=name)
 
-    # Normalise the observation: (observation - mean) / deviation, clipped.
     mean, mean_remainder = two_floats(policy.observation_mean)
-    x = node("Sub", node("Sub", "observation", constant(mean)), constant(mean_remainder))
-    x = node("Div", x, constant(policy.observation_deviation))
-    if policy.observation_clip is not None:
-        x = clip(x, policy.observation_clip)
-    for layer, (weight, bias) in enumerate(zip(policy.weights, policy.biases, strict=True)):
-        if layer > 0:  # activations stand between the layers
-            if policy.activation == "silu":
-                x = node("Mul", x, node("Sigmoid", x))
-            else:
-                x = node(OPERATORS[policy.activation], x)
-        x = node("Gemm", x, constant(weight), constant(bias), transB=1)
+    statistics = [constant(value) for value in (mean, mean_remainder, policy.observation_deviation)]
+    layers = [(constant(w), constant(b)) for w, b in zip(policy.weights, policy.biases, strict=True)]
+
+    def output_of(observation: str) -> str:
+        """Add the network on `observation`, up to its last layer."""
+        # Normalise the observation: (observation - mean) / deviation, clipped.
+        x = node("Sub", node("Sub", observation, statistics[0]), statistics[1])
+        x = node("Div", x, statistics[2])
+        if policy.observation_clip is not None:
+            x = clip(x, policy.observation_clip)
+        for layer, (weight, bias) in enumerate(layers):
+            if layer > 0:  # activations stand between the layers
+                if policy.activation == "silu":
+                    x = node("Mul", x, node("Sigmoid", x))
+                else:
+                    x = node(OPERATORS[policy.activation], x)
+            x = node("Gemm", x, weight, bias, transB=1)
+        return x
+
+    x = output_of("observation")
+    if (mirror := policy.mirror) is not None:
+        # The network once more, on the mirrored observation, for the right leg; then the actions in their order.
+        image = node("Gather", "observation", constant(mirror.index, np.int64), axis=1)
+        x = node("Concat", x, output_of(node("Mul", image, constant(mirror.sign))), axis=1)
+        x = node("Gather", x, constant(mirror.legs_order, np.int64), axis=1)
     action = node("Tanh", x, name="action") if policy.output == "tanh" else clip(x, 1.0, "action")
     # The second output: middle x factor^action of the joints that an action sets.
     power = node("Pow", constant(scale.factor), node("Gather", action, constant(scale.joints, np.int64), axis=1))
@@ -239,7 +252,7 @@ def onnx_bytes(policy: Policy, scale: Scale, contract: str) -> bytes:
         return helper.make_tensor_value_info(name, onnx.TensorProto.FLOAT, ["N", width])
 
     inputs = [float_rows("observation", policy.layer_sizes[0])]
-    outputs = [float_rows("action", policy.layer_sizes[-1]), float_rows(scale.name, len(scale.joints))]
+    outputs = [float_rows("action", policy.action_count), float_rows(scale.name, len(scale.joints))]
     graph = helper.make_graph(nodes, "springfoot", inputs, outputs, constants)
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=IR_VERSION)
     model.producer_name = "springfoot"

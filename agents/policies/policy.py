@@ -14,6 +14,7 @@ import numpy as np
 
 from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.settings.settings import BipedSettings, settings_from, settings_to_json
+from springfoot.envs.task.mirror import Mirror, mirror_of
 from springfoot.errors import SpringfootError, quoted
 from springfoot.files.tensor_file import read_tensors, write_tensors
 
@@ -61,6 +62,9 @@ RUN = "run.json"
 class Policy:
     """A deterministic policy: normalised observation -> layers -> mean action in [-1, 1].
 
+    With a `mirror`, the layers give the actions of the left leg, and for the mirrored observation those of the right
+    leg: the mirrored observation has the mirrored action, bit for bit.
+
     Calling it maps observations (N, D), or one (D,), to actions (N, 4) or (4,), float32. The result of a row
     does not depend on the other rows. Raises `SpringfootError` for another width or for an observation that
     is not finite.
@@ -71,7 +75,8 @@ class Policy:
     fingerprint: dict[str, str]
     """Fingerprint of that environment, from `fingerprint`."""
     weights: tuple[np.ndarray, ...]
-    """Weights of each layer, (outputs, inputs)."""
+    """Weights of each layer, (outputs, inputs); the last one's outputs are all actions, or with a `mirror` those of
+    the left leg."""
     biases: tuple[np.ndarray, ...]
     """Biases of each layer, (outputs,)."""
     observation_mean: np.ndarray
@@ -86,11 +91,18 @@ class Policy:
     """Activation between the layers, one of `ACTIVATIONS`."""
     output: Output = "clip"
     """Function that bounds the last layer's output."""
+    mirror: Mirror | None = None
+    """Mirror of its observations and actions, if one network acts for each leg."""
 
     @property
     def layer_sizes(self) -> list[int]:
-        """Return the widths of observation, hidden layers and actions."""
+        """Return the widths of observation, hidden layers and output."""
         return [self.weights[0].shape[1], *(len(bias) for bias in self.biases)]
+
+    @property
+    def action_count(self) -> int:
+        """Return how many actions it gives."""
+        return len(self.biases[-1]) if self.mirror is None else len(self.mirror.action_index)
 
     @property
     def header(self) -> dict[str, Any]:
@@ -103,6 +115,7 @@ class Policy:
                 "output": self.output,
                 "observation_clip": self.observation_clip,
                 "variance_floor": self.variance_floor,
+                **({} if self.mirror is None else {"mirrored": True}),
             },
             "settings": settings_to_json(self.settings),
             "fingerprint": self.fingerprint,
@@ -116,6 +129,12 @@ class Policy:
     def __call__(self, observation: np.ndarray) -> np.ndarray:
         """Return mean actions (N, 4) or (4,) in [-1, 1], float32, for observations (N, D) or (D,)."""
         rows = observation_rows(observation, len(self.observation_mean))
+        if self.mirror is None:
+            return self._output_of(rows)
+        return self.mirror.both_legs(self._output_of(rows), self._output_of(self.mirror.of(rows)))
+
+    def _output_of(self, rows: np.ndarray) -> np.ndarray:
+        """Return the network's output in [-1, 1], float32, for observations (..., D), float64 and finite."""
         rows = (rows - self.observation_mean) / self.observation_deviation
         if self.observation_clip is not None:
             rows = rows.clip(-self.observation_clip, self.observation_clip)
@@ -195,6 +214,7 @@ def read_policy(name: str | Path) -> Policy:
         clip, floor = (None if network[key] is None else float(network[key]) for key in _NUMBERS)
         activation = network["activation"]
         output = network.get("output", "clip")
+        mirrored = network.get("mirrored", False)
         sizes = list(network["layer_sizes"])
         stored = dict(header["fingerprint"])
         settings = settings_from(**values)
@@ -202,13 +222,16 @@ def read_policy(name: str | Path) -> Policy:
     except (KeyError, TypeError, ValueError, OverflowError) as error:  # the last: an integer too large for a float
         fault = f"has no {error}" if isinstance(error, KeyError) else f"is not valid: {error}"
         raise SpringfootError(f"{name}: its header {fault}") from None
-    known = activation in ACTIVATIONS and output in get_args(Output)
+    known = activation in ACTIVATIONS and output in get_args(Output) and isinstance(mirrored, bool)
     if not known or floor is None or not 0 <= floor <= LARGEST_WEIGHT:
         raise SpringfootError(f"{name}: its header asks for a network this version does not have: {quoted(network)}")
     if clip is not None and not 0 < clip <= LARGEST_WEIGHT:
         raise SpringfootError(f"{name}: observation_clip must be in (0, {LARGEST_WEIGHT:g}] or null, is {clip:g}")
-    if len(sizes) < 2 or (sizes[0], sizes[-1]) != (len(biped.observation_names), len(biped.action_names)):
-        raise SpringfootError(f"{name}: its layers {sizes} do not lead from observation to action")
+    mirror = mirror_of(biped.observation_names, biped.action_names) if mirrored else None
+    ends = (len(biped.observation_names), len(biped.action_names) // (2 if mirrored else 1))
+    if len(sizes) < 2 or (sizes[0], sizes[-1]) != ends:
+        actions = "the actions of one leg" if mirrored else "action"
+        raise SpringfootError(f"{name}: its layers {sizes} do not lead from observation to {actions}")
     _check_tensors(name, tensors, sizes)
     current = fingerprint(biped)
     require_same(name, stored, current)
@@ -224,6 +247,7 @@ def read_policy(name: str | Path) -> Policy:
         variance_floor=floor,
         activation=activation,
         output=output,
+        mirror=mirror,
     )
 
 
@@ -231,7 +255,7 @@ def _check_tensors(name: str | Path, tensors: dict[str, np.ndarray], sizes: list
     """Raise `SpringfootError` unless the tensors of the policy `name` are those of its layers, with numbers within
     bounds.
 
-    `sizes` are the widths of observation, hidden layers and actions.
+    `sizes` are the widths of observation, hidden layers and output.
     """
     shapes = {"observation.mean": (sizes[0],), "observation.variance": (sizes[0],)}
     for layer, (inputs, outputs) in enumerate(pairwise(sizes)):

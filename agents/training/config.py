@@ -55,6 +55,8 @@ class TrainingConfig:
     """Logarithm of the standard deviation of the actions at the start."""
     hidden: tuple[int, ...] = (64, 64)
     """Widths of the hidden tanh layers, the same for actor and critic."""
+    mirrored: bool = False
+    """One network for each leg, the right one's on the mirrored world: left and right act alike to the last bit."""
     eval_interval: int = 131_072
     """Environment steps between two periodic evaluations (deterministic, the training's own settings)."""
     eval_episodes: int = 16
@@ -75,6 +77,8 @@ class TrainingConfig:
         for name in ("gae_lambda", "learning_rate_end"):
             require_number(name, getattr(self, name), 0, 1)
         require_number("log_std", self.log_std, -5, 2)
+        if not isinstance(self.mirrored, bool):
+            raise SpringfootError(f"mirrored must be True or False, got {quoted(self.mirrored)}")
         layers = self.hidden if isinstance(self.hidden, tuple) else ()
         if not layers or any(type(width) is not int or width < 1 for width in layers):
             raise SpringfootError(f"hidden must be one or more positive whole numbers, got {quoted(self.hidden)}")
@@ -122,8 +126,13 @@ PRESETS: dict[str, TrainingConfig] = {
 def config_to_json(config: TrainingConfig) -> dict[str, Any]:
     """Return a configuration as a dictionary of plain JSON values; `config_from_json` is its inverse."""
     values = {item.name: getattr(config, item.name) for item in dataclasses.fields(config)}
-    values = {name: int(value) if isinstance(value, Integral) else value for name, value in values.items()}
+    values = {name: int(value) if _is_count(value) else value for name, value in values.items()}
     return values | {"hidden": list(config.hidden), "environment": settings_to_json(config.environment)}
+
+
+def _is_count(value: Any) -> bool:
+    """Return True for a whole number, also NumPy's, that is neither True nor False."""
+    return isinstance(value, Integral) and not isinstance(value, bool)
 
 
 def config_from_json(values: dict[str, Any]) -> TrainingConfig:
@@ -137,6 +146,12 @@ def config_from_json(values: dict[str, Any]) -> TrainingConfig:
     if "environment" in plain:
         plain["environment"] = settings_from(**plain["environment"])
     return TrainingConfig(**plain)
+
+
+def require_not_mirrored(config: TrainingConfig) -> None:
+    """Raise `SpringfootError` for a mirrored network, which RLlib does not train."""
+    if config.mirrored:
+        raise SpringfootError("--engine rllib trains no mirrored network: give --mirrored False, or another engine")
 
 
 def processors() -> int:

@@ -14,19 +14,22 @@ from stable_baselines3.common.running_mean_std import RunningMeanStd
 from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
 from springfoot.envs.physics.timing import ACTION_STEP
+from springfoot.envs.task.mirror import mirror_of
 from springfoot.errors import SpringfootError
 
 from ..policies.conversion import actor_of, ignoring_unvaried
 from ..policies.number_bounds import require_bounded, require_moments
 from ..policies.policy import Policy
 from .config import TrainingConfig
+from .mirrored_network import MirroredMeanStd, MirroredNetwork
 
 
 class Learner:
     """An untrained actor and critic on a batch of environments, with stable-baselines3's PPO to train them.
 
     Weights are orthogonal, biases zero; with gain 0.01 on the action layer the mean action begins near 0. Observations
-    and rewards are normalised by their running statistics.
+    and rewards are normalised by their running statistics. With `mirrored` network and statistics are those of
+    `mirrored_network`.
     """
 
     def __init__(self, config: TrainingConfig, environments: VecEnv, seed: int) -> None:
@@ -36,12 +39,19 @@ class Learner:
         gamma = config.gamma**steps_of_20ms
         gae_lambda = config.gae_lambda**steps_of_20ms
         self.normalized = VecNormalize(environments, gamma=gamma)
+        self._mirror = None
+        network: dict[str, Any] = {}
+        if config.mirrored:
+            (biped,) = environments.get_attr("biped", 0)
+            self._mirror = mirror_of(biped.observation_names, biped.action_names)
+            network["mirror"] = self._mirror
+            self.normalized.obs_rms = MirroredMeanStd(self._mirror)
         self.rollout_steps = config.update_steps // config.num_envs
         samples = self.rollout_steps * config.num_envs
         with warnings.catch_warnings():  # a last minibatch that is a few samples smaller does no harm
             warnings.filterwarnings("ignore", message="You have specified a mini-batch size")
             self.ppo = PPO(
-                "MlpPolicy",
+                MirroredNetwork if config.mirrored else "MlpPolicy",
                 self.normalized,
                 # left: fraction of the training that is still to come, 1 at its start
                 learning_rate=lambda left: config.learning_rate * (left + config.learning_rate_end * (1 - left)),
@@ -55,6 +65,7 @@ class Learner:
                     "net_arch": list(config.hidden),
                     "activation_fn": torch.nn.Tanh,
                     "log_std_init": config.log_std,
+                    **network,
                 },
                 seed=seed,
                 device="cpu",
@@ -74,6 +85,7 @@ class Learner:
                 observation_mean=seen.mean.copy(),
                 observation_variance=seen.var,
                 observation_clip=self.normalized.clip_obs,
+                mirror=self._mirror,
             )
         )
 

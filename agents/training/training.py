@@ -94,7 +94,8 @@ def resume(
 def _require_same_shape(out: Path, of_checkpoint: Mapping[str, Any], of_record: Mapping[str, Any]) -> None:
     """Raise `SpringfootError` if the configurations of checkpoint and run.json differ in a setting that decides the
     shape of the arrays; `out` is the run's folder."""
-    for name in ("num_envs", "hidden"):
+    of_checkpoint = {"mirrored": False, **of_checkpoint}  # as before it was a setting
+    for name in ("num_envs", "hidden", "mirrored"):
         if of_checkpoint[name] != of_record[name]:
             raise SpringfootError(
                 f"{out} was trained with {name} {of_checkpoint[name]}; its {RUN} says {of_record[name]}"

@@ -30,8 +30,10 @@ _PLAIN: dict[Any, tuple[Callable[[str], Any], str]] = {
 def flag_of(kind: Any) -> tyro.constructors.PrimitiveConstructorSpec:
     """Return tyro's reader of a flag whose value is of type `kind`, such as `tuple[float, float] | None`.
 
-    The word `None` is a value only of types that can be None.
+    The word `None` is a value only of types that can be None. A flag of type `bool` alone means True.
     """
+    if kind is bool:
+        return reader_of_words(lambda words: not words or _read(Literal[True, False], words), "[True|False]", (0, 1))
     tuple_kind = next((part for part in _parts(kind) if get_origin(part) is tuple), None)  # `kind`, or a part of it
     items = get_args(tuple_kind) if tuple_kind is not None else ()
     count: Any = "*" if _is_open(items) else len(items) or 1

@@ -70,6 +70,16 @@ def test_help_groups_the_settings_by_theme_and_says_what_a_trained_policy_brings
     assert "nothing" in groups["episode"] and "A trained policy brings its own." in groups["springs"]
 
 
+def test_a_flag_of_a_yes_or_no_is_yes_alone_and_takes_both_words(capsys):
+    for words, value in ((["--mirrored"], True), (["--mirrored", "True"], True), (["--mirrored", "False"], False)):
+        flags = tyro.cli(train_command.TrainingFlags, args=[*words, "--seed", "3"])
+        assert given(flags) == {"mirrored": value, "seed": 3}
+    for words in (["--mirrored", "yes"], ["--mirrored", "True", "False"]):
+        with pytest.raises(SystemExit):
+            tyro.cli(train_command.TrainingFlags, args=words)
+    assert "must be one of True, False, got 'yes'" in " ".join(capsys.readouterr().err.replace("│", " ").split())
+
+
 def test_flags_take_the_place_of_the_preset():
     preset = PRESETS["walk"]
     config = train_command.configured(preset, {"timesteps": 5}, {"height": 1.8, "ankle_stiffness_range": (30, 300)})

@@ -46,8 +46,16 @@ def observations(policy):
     return rows.astype(np.float32)
 
 
-def drawn(activation="tanh", output: Output = "clip", sizes=(D, 48, 24, 4), clip: float | None = 10.0, **settings):
+def drawn(
+    activation="tanh",
+    output: Output = "clip",
+    sizes=(D, 48, 24, 4),
+    clip: float | None = 10.0,
+    mirrored=False,
+    **settings,
+):
     """A policy of random weights that reaches both ends of its actions."""
+    sizes = (*sizes[:-1], 2) if mirrored else sizes
     random = np.random.default_rng(2)
     layers = [(random.normal(0, 1 / np.sqrt(i), (o, i)), random.normal(0, 0.2, o)) for i, o in pairwise(sizes)]
     layers[-1] = (0.5 * layers[-1][0], layers[-1][1])
@@ -59,6 +67,7 @@ def drawn(activation="tanh", output: Output = "clip", sizes=(D, 48, 24, 4), clip
         observation_mean=random.normal(size=D),
         observation_variance=np.where(np.arange(D) % 7, random.uniform(0.5, 2.0, D), 1e-6 if clip else 1.0),
         observation_clip=clip,
+        mirrored=mirrored,
     )
 
 
@@ -70,6 +79,8 @@ POLICIES = {
     "linear": lambda: drawn(sizes=(D, 4)),
     "ankle": lambda: drawn(stiffness_joints="ankle", ankle_stiffness_range=(30.0, 700.0)),
     "residual": lambda: drawn(action_mode="residual"),
+    "mirrored": lambda: drawn(mirrored=True),
+    "mirrored, as SAC": lambda: drawn("silu", "tanh", mirrored=True, stiffness_joints="ankle"),
 }
 
 
@@ -123,6 +134,18 @@ def test_a_residual_export_says_which_schedule_its_factor_multiplies(right_foot,
     for side, (name, curves) in enumerate((("left", schedule), ("right", schedule.get("right", schedule)))):
         ankle = np.interp(phase[:, side], np.arange(100) / 100, curves["ankle"][0], period=1.0)
         assert info[f"stiffness/ankle_{name}"] == pytest.approx(factor[:, 2 * side] * ankle * own, rel=3e-5)  # float32
+
+
+@pytest.mark.parametrize("activation", ACTIVATIONS)
+def test_an_export_of_a_mirrored_policy_mirrors_to_the_bit(activation, tmp_path):
+    policy = drawn(activation, mirrored=True)
+    assert policy.mirror is not None
+    rows, play = observations(policy), exported(policy, tmp_path)
+    for count in (1, 7, 64, len(rows)):
+        action, image = (play(each[:count])[0] for each in (rows, policy.mirror.of(rows)))
+        assert image.tobytes() == np.take(action, policy.mirror.action_index, -1).tobytes()
+    assert contract_of(policy)["network"]["mirrored"] is True
+    assert np.array_equal(load_policy(tmp_path / "walk.onnx")(rows), play(rows)[0])
 
 
 def test_the_contract_names_everything_in_its_order_and_nothing_of_where_or_when():

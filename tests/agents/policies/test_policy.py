@@ -13,6 +13,7 @@ from springfoot.agents.policies.policy import Policy, load_policy, read_policy, 
 from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.control.constants import leg_constants
 from springfoot.envs.settings.settings import BipedSettings, settings_from
+from springfoot.envs.task.mirror import mirror_of
 from springfoot.errors import SpringfootError
 from springfoot.files.writing import write_atomically
 
@@ -20,10 +21,10 @@ SETTINGS = BipedSettings(speed=1.1, ankle_stiffness_range=(30.0, 700.0), reward_
 NETWORK = {"observation_clip": 10, "activation": "tanh", "variance_floor": 1e-8}
 
 
-@pytest.fixture(scope="module")
-def policy():
+def drawn(mirrored=False):
+    """A policy of random weights, whose statistics are not alike on both sides."""
     biped, random = Biped(SETTINGS, 1), np.random.default_rng(0)
-    sizes = [len(biped.observation_names), 64, 64, 4]
+    sizes = [len(biped.observation_names), 64, 64, 2 if mirrored else 4]
     return Policy(
         settings=SETTINGS,
         fingerprint=fingerprint(biped),
@@ -32,7 +33,18 @@ def policy():
         observation_mean=random.normal(size=sizes[0]),
         observation_variance=random.uniform(0.1, 2.0, sizes[0]),
         observation_clip=7.0,
+        mirror=mirror_of(biped.observation_names, biped.action_names) if mirrored else None,
     )
+
+
+@pytest.fixture(scope="module")
+def policy():
+    return drawn()
+
+
+@pytest.fixture(scope="module")
+def mirrored():
+    return drawn(mirrored=True)
 
 
 @pytest.fixture
@@ -40,7 +52,9 @@ def observations(policy):
     return np.random.default_rng(1).normal(0, 3, (65, len(policy.observation_mean))).astype(np.float32)
 
 
-def test_a_saved_policy_acts_the_same_to_the_bit(policy, observations, tmp_path):
+@pytest.mark.parametrize("form", ["policy", "mirrored"])
+def test_a_saved_policy_acts_the_same_to_the_bit(form, request, observations, tmp_path):
+    policy = request.getfixturevalue(form)
     save_policy(tmp_path / "policy.safetensors", policy)
     again = read_policy(tmp_path / "policy.safetensors")
     assert np.array_equal(again(observations), policy(observations))
@@ -61,12 +75,33 @@ def test_forward_pass_is_the_network_written_out(policy, observations):
     assert (np.abs(expected) == 1).any() and (np.abs(expected) < 1).any()
 
 
-def test_a_row_does_not_depend_on_the_others(policy, observations):
+@pytest.mark.parametrize("form", ["policy", "mirrored"])
+def test_a_row_does_not_depend_on_the_others(form, request, observations):
+    policy = request.getfixturevalue(form)
     whole = policy(observations)
     for size in (1, 2, 7, 64):
         parts = [policy(observations[k : k + size]) for k in range(0, len(observations), size)]
         assert np.array_equal(np.concatenate(parts), whole)
     assert np.array_equal(policy(observations[5]), whole[5])
+
+
+def test_a_mirrored_policy_is_the_left_legs_network_on_both_images(mirrored, observations):
+    left = replace(mirrored, mirror=None)
+    one, other = left(observations), left(mirrored.mirror.of(observations))
+    assert np.array_equal(mirrored(observations), np.concatenate([one, other], -1))  # left ankle and toe, then right
+    assert np.abs(one - other).max() > 0.5
+
+
+def test_the_mirrored_observation_has_the_mirrored_action_to_the_bit(mirrored, observations):
+    action, image = mirrored(observations), mirrored(mirrored.mirror.of(observations))
+    assert image.tobytes() == np.take(action, mirrored.mirror.action_index, -1).tobytes()
+    assert action.flags.c_contiguous and action.shape == (65, 4)
+    assert np.array_equal(mirrored(observations[3]), action[3])
+
+
+def test_a_plain_policys_header_has_no_word_of_mirrors(policy, mirrored):
+    assert "mirrored" not in policy.header["network"] and mirrored.header["network"]["mirrored"] is True
+    assert mirrored.layer_sizes == [43, 64, 64, 2] and (policy.action_count, mirrored.action_count) == (4, 4)
 
 
 @pytest.mark.parametrize(("change", "words"), [(lambda x: x[:, :-1], "must be"), (lambda x: x * np.nan, "finite")])
@@ -137,6 +172,21 @@ def changed(policy, path, header=None, tensors=None):
         ({"network": NETWORK | {"layer_sizes": [3, 4], "observation_clip": 0}}, {}, "observation_clip must be in"),
         ({"network": NETWORK | {"layer_sizes": []}}, {}, r"layers \[\] do not lead from observation to action"),
         ({"network": NETWORK | {"layer_sizes": [3, 4]}}, {}, r"layers \[3, 4\] do not lead"),
+        (
+            {"network": NETWORK | {"layer_sizes": [43, 64, 64, 4], "mirrored": 1}},
+            {},
+            "a network this version does not",
+        ),
+        (
+            {"network": NETWORK | {"layer_sizes": [43, 64, 64, 4], "mirrored": True}},
+            {},
+            r"layers \[43, 64, 64, 4\] do not lead from observation to the actions of one leg",
+        ),
+        (
+            {"network": NETWORK | {"layer_sizes": [43, 64, 64, 2], "mirrored": True}},
+            {},
+            r"layer.2.bias must be \(2,\), is \(4,\)",
+        ),
         ({"fingerprint": None}, {}, "header is not valid"),
         ({"fingerprint": [1]}, {}, "header is not valid"),
         (

@@ -122,6 +122,23 @@ def test_ctrl_c_within_an_update_and_in_the_last_evaluation(whole, half, monkeyp
 
 
 @pytest.mark.slow
+def test_a_mirrored_run_goes_on_bit_for_bit(tmp_path):
+    config = dataclasses.replace(CONFIG, mirrored=True)
+    train(config, tmp_path / "whole")
+    with ctrl_c_after(1400):
+        train(config, tmp_path / "half")
+    assert resume(tmp_path / "half")["status"] == "finished"
+    assert differences(tmp_path / "whole", tmp_path / "half") == []
+
+
+def test_a_run_cannot_change_its_form(half):
+    record = {name: value for name, value in read_record(half).items() if name != "sha256"}
+    (half / "run.json").write_text(json.dumps(record | {"config": record["config"] | {"mirrored": True}}))
+    with pytest.raises(SpringfootError, match=r"was trained with mirrored False; its run\.json says True"):
+        resume(half)
+
+
+@pytest.mark.slow
 def test_a_damaged_newest_checkpoint_is_passed_over(whole, half, capsys):
     newest, second = checkpoints(half)[:2]
     newest.write_bytes(newest.read_bytes()[:-100])
