@@ -44,7 +44,7 @@ class TrainFlags:
     seeds: Annotated[int | None, tyro.conf.arg(metavar="INT", help_behavior_hint="")] = None
     """Train from so many seeds at once, --seed and the next ones: one process a processor, one thread each, one
     report with the spread; each in a folder seed-N of --out."""
-    preset: Literal["walk", "any-body", "predict"] = "walk"
+    preset: Literal["walk", "any-body", "predict", "person"] = "walk"
     """Training that is known to work, from which the other flags differ: one body at one speed; people of
     1.45-2.00 m and 40-120 kg at 0.8-1.6 m/s, drawn anew for each episode, with speeds that change within it; or one
     body that follows its own plan, no curve of people's."""

@@ -18,7 +18,6 @@ EXTRA_OF = {
     "pyarrow": "parquet",
     "ray": "rllib",
     "rich": "evaluate",
-    "safetensors": "evaluate",
     "stable_baselines3": "train",
     "tensorboard": "train",
     "tensorboardX": "rllib",

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from springfoot.envs.batch.biped_batch import Biped
+from springfoot.envs.batch.learned_person import digest_of_person
 from springfoot.envs.control.constants import LegConstants
 from springfoot.envs.control.equilibrium import foot_curves, foot_feed
 from springfoot.envs.control.legs import PLANNED_PLACE, leg_curves
@@ -26,7 +27,8 @@ _EVERY = 50
 
 
 def fingerprint(biped: Biped) -> dict[str, str]:
-    """Return the SHA-256 digests of all that a policy relies on: `observation`, `action`, compiled `model`, and `legs`.
+    """Return the SHA-256 digests of all that a policy relies on: `observation`, `action`, compiled `model`, `legs`, and
+    the file of a learned `person`.
 
     `legs` digests the constants of hips, knees and foot springs, and the target curves, at every tabulated speed; the
     planned position of the CoM counts only if the gain `swing_place_gain` reads it. Numbers count to six significant
@@ -41,7 +43,9 @@ def fingerprint(biped: Biped) -> dict[str, str]:
         of_legs += [*_digested_constants(constants).values(), *(curve[::_EVERY] for curve in curves)]
         if (feed := foot_feed(biped.settings, constants, walk)) is not None:
             of_legs.append(feed[::_EVERY])
-    return {
+    person = biped.settings.person
+    of_person = {} if person == "tuned" else {"person": digest_of_person(person)}
+    return of_person | {
         "observation": _digest(biped.observation_names, biped.observation_low, biped.observation_high),
         "action": _digest(biped.action_names, stiffness_of(actions, biped.settings, biped.body)),
         "model": _digest(_MODEL_NUMBERS, *(getattr(model, name) for name in _MODEL_NUMBERS), [model.opt.timestep]),

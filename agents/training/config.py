@@ -102,6 +102,39 @@ PREDICTED = replace(
 """Task of a body that follows its own plan: the action is a factor on the schedule found with its leg constants. The
 reward pays for CoM, speed and ZMP of the plan and charges effort; angles and forces do not count."""
 
+PERSON = replace(
+    TRAINED_ON,
+    acts="both",
+    action_mode="residual",
+    stiffness_by="drawn",
+    ankle_tendon=400.0,
+    push_newton=80.0,
+    height_range=(1.5, 1.9),
+    mass_range=(50.0, 90.0),
+    speed_range=(0.8, 1.6),
+    speed_interval=5.0,
+    slope_range_deg=(-5.0, 5.0),
+    unevenness_m=0.005,
+    reward_weights={
+        "alive": 2.0,
+        "speed": 0.5,
+        "com_x": 0.2,
+        "com_z": 0.0,
+        "zmp": 0.0,
+        "pose": 1.0,
+        "grf": 1.0,
+        "stiffness_rate": -0.05,
+        "fibre_work": -2.0,
+        "activation": -0.3,
+        "impact": -0.3,
+        "speed_held": -6.0,
+        "person_rate": -0.03,
+    },
+)
+"""Task of a person: rest angles of hips, knees and ankles, and the stiffness where no other sets it, on drawn bodies,
+speeds and slopes. The reward pays for a held speed and charges what the muscles spend; people's angles and forces count
+less than for stiffness alone."""
+
 PRESETS: dict[str, TrainingConfig] = {
     "walk": TrainingConfig(),
     "any-body": TrainingConfig(
@@ -119,6 +152,17 @@ PRESETS: dict[str, TrainingConfig] = {
         ),
     ),
     "predict": TrainingConfig(timesteps=500_000, environment=PREDICTED),
+    "person": TrainingConfig(
+        timesteps=7_000_000,
+        num_envs=120,
+        update_steps=7680,
+        epochs=5,
+        log_std=-1.2,
+        hidden=(128, 128),
+        mirrored=True,
+        eval_interval=384_000,
+        environment=PERSON,
+    ),
 }
 """Name -> training that is known to work."""
 

@@ -28,16 +28,18 @@ from ..physics.foot import Feet
 from ..physics.measurement import Measurement
 from ..physics.model import ACTIONS, JOINTS, PERSON_ACTIONS, SIDES
 from ..physics.simulation import MjData, MjModel, Simulation
-from ..physics.timing import CONTROL_WINDOW
+from ..physics.timing import CONTROL_WINDOW, WINDOWS_PER_STEP
 from ..settings.checks import real_numbers
 from ..settings.settings import BipedSettings
 from ..task.episode_end import reasons_of
 from ..task.ground import Ground
 from ..task.initial_state import place, random_phase, start_table, walking_posture
 from ..task.observation import SensorNoise
+from ..task.observation_entries import PERSON_OBSERVATION
 from ..task.pushes import Pushes
 from ..task.reward import Task
 from .exact_state import ExactState
+from .learned_person import LearnedPerson
 from .step_kernels import EnvironmentRows, Tables, begin_step, begin_window, end_step, end_window, next_window
 from .step_result import StepResult, Tick, empty_outcome, stiffness_and_rest
 
@@ -113,6 +115,7 @@ class Biped(ExactState):
         self._standing = Standing(settings, self.subjects) if starts_or_stops else None
         self._simulation = Simulation(self.body, num_envs, num_threads, model, settings.friction, feet)
         self._person = PersonActions(settings, self.subjects.rows)
+        self._learned = None if settings.person == "tuned" else LearnedPerson(settings.person, settings.guide)
         self._task = Task(settings, table, self.subjects, self._simulation.feet)
         self._ground = Ground(settings, self._simulation, self.subjects, self._task.rows)
         self._noise = SensorNoise(settings.sensor_noise, self._task.rows)
@@ -312,11 +315,23 @@ class Biped(ExactState):
             self._legs.follow()
         if self.settings.push_newton:
             self._simulation.push(self._pushes.force(self._steps, self._random, step.running))
-        if step.of_person is not None:
-            self._person.move(step.of_person, step.walking, step.running)
+        if step.of_person is not None or self._learned is not None:
+            self._move_person(step, 0)
         options = self._springs.options
         bodies = self._simulation.arrays.bodies
         begin_step(self._rows, bodies, self._tables, options, step.factor, step.walking, step.fixed)
+
+    def _move_person(self, step: "_Step", window: int) -> None:
+        """Move the rest angles of hips, knees and ankles before control window number `window` of the step: by the
+        action at the step's beginning, or by a learned person every 20 ms."""
+        resting = step.running & ~step.walking
+        if step.of_person is not None:
+            self._person.move(self._person.offsets(step.of_person), step.walking, resting)
+        elif self._learned is not None:
+            windows = self._steps * self.windows_per_step + window  # since the episode began
+            moving = step.walking & (windows % WINDOWS_PER_STEP == 0)
+            observation = self._task.observe(self._simulation.arrays.bodies, len(PERSON_OBSERVATION))
+            self._person.move(self._learned.offsets(observation, moving), moving, resting)
 
     def _simulate(self, step: "_Step") -> None:
         """Run the physics of one control window with the control that the springs, the legs and the stance set."""
@@ -334,12 +349,15 @@ class Biped(ExactState):
     def _next_window(self, step: "_Step", window: int) -> None:
         """End control window number `window` of the step and begin the next."""
         options = self._springs.options
-        if step.window_start is None:
+        person_acts = self._learned is not None and (window + 1) % WINDOWS_PER_STEP == 0  # in steps of 40 ms
+        if step.window_start is None and not person_acts:
             next_window(self._rows, self._physics, self._tables, options, window, step.walking)
             self._after_window(step)
         else:  # report the window with the control that produced it
             end_window(self._rows, self._physics, window, step.walking)
             self._after_window(step)
+            if person_acts:
+                self._move_person(step, window + 1)
             begin_window(self._rows, self._simulation.arrays.bodies, self._tables, options, step.walking)
 
     def _after_window(self, step: "_Step") -> None:

@@ -63,12 +63,16 @@ class PersonActions:
             for index, random in zip(ids.tolist(), randoms, strict=True):
                 self._source[index] = draw_source(self._settings, random)
 
-    def move(self, actions: NDArray, walking: NDArray, running: NDArray) -> None:
-        """Move the rest angles of the bodies `walking` (N,) by actions (N, 6), clipped to [-1, 1], in the order of
-        `PERSON_ACTIONS`; those of other `running` (N,) bodies go back."""
-        offset = self._range * np.clip(actions, -1.0, 1.0).reshape(-1, len(SIDES), len(MOVED))
-        self._offset[walking] = offset[walking]
-        self._offset[running & ~walking] = 0.0
+    def offsets(self, actions: NDArray) -> NDArray:
+        """Return the offsets (N, side, 3) [rad] of actions (N, 6), clipped to [-1, 1], in the order of
+        `PERSON_ACTIONS`."""
+        return self._range * np.clip(actions, -1.0, 1.0).reshape(-1, len(SIDES), len(MOVED))
+
+    def move(self, offsets: NDArray, moving: NDArray, resting: NDArray) -> None:
+        """Move the rest angles of the bodies `moving` (N,) by `offsets` (N, side, 3) [rad]; those of bodies `resting`
+        (N,) go back."""
+        self._offset[moving] = offsets[moving]
+        self._offset[resting] = 0.0
 
     def replace(self, factor: NDArray, ranges: NDArray, running: NDArray, randoms: Sequence) -> None:
         """Replace the factors (N, 4) of the actions on the stiffness where the action does not set it.

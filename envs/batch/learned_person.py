@@ -1,0 +1,149 @@
+"""Let a learned person walk: a network in the step moves the rest angles of hips, knees and ankles every 20 ms.
+
+The network is a mirrored policy (`springfoot.agents.policies.policy`) of a training with `acts` "both" or "person". It
+acts by its mean action, on the observation without noise, told that others set the stiffness. Its sums run in one order
+for any number of bodies: the bits do not depend on the batch.
+"""
+
+from hashlib import sha256
+from math import radians, tanh
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from springfoot.arrays import NDArray
+from springfoot.errors import SpringfootError
+from springfoot.files.tensor_file import read_tensors
+
+from ..physics.kernel import kernel
+from ..physics.model import ACTIONS, MOVED, PERSON_ACTIONS, SIDES
+from ..task.mirror import mirror_of
+from ..task.observation_entries import PERSON_OBSERVATION
+
+FOLDER = Path(__file__).parent / "persons"
+"""Folder of the persons that come with the package."""
+LEARNED = {"learned": "learned-1"} | {name: name for name in (f"learned-{number}" for number in range(1, 6))}
+"""Name of a person of this package -> its file in `FOLDER`."""
+ENTRIES = frozenset({"format_version", "network", "settings", "fingerprint"})
+"""Entries of a policy's header."""
+NAMES = tuple(entry.name for entry in PERSON_OBSERVATION)
+_OF_STIFFNESS = np.array([NAMES.index(name) for name in ("own_stiffness", *(f"last_action_{a}" for a in ACTIONS))])
+"""Entries that are 0 where others set the stiffness."""
+
+
+def person_file(name: str) -> Path:
+    """Return the file of a person, one of `LEARNED` or a path; raise `SpringfootError` if there is none."""
+    path = FOLDER / f"{LEARNED[name]}.safetensors" if name in LEARNED else Path(name)
+    if not path.is_file():
+        known = ", ".join(map(repr, ("tuned", *LEARNED)))
+        raise SpringfootError(f"person must be one of {known}, or the file of a policy that is one, got {name!r}")
+    return path
+
+
+@kernel
+def _act(observation, acting, mean, deviation, clip, index, sign, weights, biases, offsets) -> None:
+    """Fill the offsets of the bodies `acting` (N,): the last three outputs of the network for each leg, in [-1, 1].
+
+    Args:
+        observation: (N, D) float32.
+        acting: (N,) bool; the offsets of other bodies stay.
+        mean, deviation: (D,) of the observations in training.
+        clip: largest magnitude of a normalised entry.
+        index, sign: (D,) of the mirror image, see `springfoot.envs.task.mirror`.
+        weights: of each layer, (inputs, outputs).
+        biases: of each layer, (outputs,).
+        offsets: (N, side, 3), hip, knee and ankle.
+    """
+    entries = len(mean)
+    for i in range(len(observation)):
+        if not acting[i]:
+            continue
+        for side in range(2):
+            layer_input = np.empty(entries)
+            for k in range(entries):
+                seen = observation[i, k] if side == 0 else observation[i, index[k]] * sign[k]
+                layer_input[k] = min(max((seen - mean[k]) / deviation[k], -clip), clip)
+            for layer in range(len(weights)):
+                weight = weights[layer]
+                output = biases[layer].copy()
+                for k in range(len(layer_input)):
+                    for unit in range(len(output)):
+                        output[unit] += layer_input[k] * weight[k, unit]
+                if layer < len(weights) - 1:  # activations stand between the layers
+                    for unit in range(len(output)):
+                        output[unit] = tanh(output[unit])
+                layer_input = output
+            for joint in range(3):
+                offsets[i, side, joint] = min(max(layer_input[len(layer_input) - 3 + joint], -1.0), 1.0)
+
+
+class LearnedPerson:
+    """The network of a person, read from its file.
+
+    Args:
+        name: one of `LEARNED`, or a policy's file.
+        guide: the setting of the environment; a person of another guide is refused.
+
+    Raises `SpringfootError` for a file that is no person.
+    """
+
+    def __init__(self, name: str, guide: str) -> None:
+        network, settings, tensors = _read(person_file(name))
+        if settings.get("guide", "people") != guide:
+            raise SpringfootError(f"person {name!r} was trained with guide {settings.get('guide')!r}, not {guide!r}")
+        self._scale = radians(settings["person_range_deg"])
+        mirror = mirror_of(NAMES, _action_names(settings))
+        layers = range(len(network["layer_sizes"]) - 1)
+        clip = np.inf if network["observation_clip"] is None else float(network["observation_clip"])
+        self._network = (
+            tensors["observation.mean"].astype(float),
+            np.sqrt(tensors["observation.variance"].astype(float) + network["variance_floor"]),
+            clip,
+            mirror.index,
+            mirror.sign.astype(float),
+            tuple(np.ascontiguousarray(tensors[f"layer.{layer}.weight"].T, float) for layer in layers),
+            tuple(tensors[f"layer.{layer}.bias"].astype(float) for layer in layers),
+        )
+
+    def offsets(self, observation: NDArray, acting: NDArray) -> NDArray:
+        """Return the offsets (N, side, 3) of the rest angles of hips, knees and ankles [rad]; 0 for bodies that are not
+        `acting` (N,).
+
+        `observation` is (N, D) as `PERSON_OBSERVATION`, without noise; its entries on the stiffness of actions are
+        changed to 0.
+        """
+        observation[:, _OF_STIFFNESS] = 0.0
+        offsets = np.zeros((len(observation), len(SIDES), len(MOVED)))
+        _act(observation, acting, *self._network, offsets)
+        return self._scale * offsets
+
+
+def digest_of_person(name: str) -> str:
+    """Return the SHA-256 digest of a person's file."""
+    return sha256(person_file(name).read_bytes()).hexdigest()
+
+
+def _action_names(settings: dict[str, Any]) -> tuple[str, ...]:
+    """Return the names of a person's actions."""
+    return ACTIONS + PERSON_ACTIONS if settings["acts"] == "both" else PERSON_ACTIONS
+
+
+def _read(path: Path) -> tuple[dict[str, Any], dict[str, Any], dict[str, NDArray]]:
+    """Return network and settings of a person's header, and its tensors; raise `SpringfootError` for another file."""
+    header, tensors = read_tensors(path, "springfoot", "policy", ENTRIES)
+    network = header.get("network", {})
+    settings = header.get("settings", {})
+    fits = (
+        settings.get("acts") in ("both", "person")
+        and network.get("mirrored") is True
+        and network.get("activation") == "tanh"
+        and network.get("output", "clip") == "clip"
+        and network["layer_sizes"][0] == len(NAMES)
+        and network["layer_sizes"][-1] == len(_action_names(settings)) // 2
+    )
+    if not fits:
+        raise SpringfootError(
+            f"{path} is no person: it must be a mirrored policy of tanh layers, trained with acts 'both' or 'person'"
+        )
+    return network, settings, tensors
