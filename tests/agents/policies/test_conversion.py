@@ -231,6 +231,11 @@ W, B = np.zeros((4, D)), np.zeros(4)
         ([(W, B), (W, B)], {}, f"layer 1: weight must be (outputs, 4), the outputs of the layer before, is (4, {D})"),
         ([(W, B[:3])], {}, "layer 0: bias must be (4,), is (3,)"),
         ([(W[:2], B[:2])], {}, "the last layer must have 4 outputs, one for each action, has 2"),
+        (
+            [(W, B)],
+            {"mirrored": True},
+            "the last layer must have 2 outputs, one for each action of the left leg, has 4",
+        ),
         ([], {}, f"the last layer must have 4 outputs, one for each action, has {D}"),
         ([(W * np.nan, B)], {}, "layer 0: weight must be finite, has NaN or infinity"),
         ([(W, B + np.inf)], {}, "layer 0: bias must be finite, has NaN or infinity"),

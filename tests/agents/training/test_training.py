@@ -81,9 +81,14 @@ def test_a_policy_of_any_body_reads_speed_and_height_and_is_evaluated_on_one_bod
         assert np.abs(policy(other) - policy(seen)).max() > 1e-4, name
 
 
-@pytest.mark.parametrize("config", [SHORT, *PRESETS.values()])
+@pytest.mark.parametrize("config", [SHORT, dataclasses.replace(SHORT, mirrored=True), *PRESETS.values()])
 def test_configuration_survives_json(config):
     assert config_from_json(json.loads(json.dumps(config_to_json(config)))) == config
+
+
+def test_a_configuration_without_a_form_is_not_mirrored():
+    values = {name: value for name, value in config_to_json(SHORT).items() if name != "mirrored"}
+    assert config_from_json(values) == SHORT
 
 
 @pytest.mark.parametrize(
