@@ -10,7 +10,7 @@ from springfoot.errors import SpringfootError
 
 from .batch.biped_batch import Biped
 from .batch.step_result import INFO, report_start
-from .gym_face import METADATA, Face, bodies_and_speeds, check_options, check_render_mode, spaces_of
+from .gym_face import METADATA, Face, check_options, check_render_mode, given_walkers, spaces_of
 from .physics.simulation import MjData, MjModel
 from .settings.checks import check_seed, real_numbers
 from .settings.settings import settings_from
@@ -62,6 +62,11 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
     | adaptive  | the action's, fixed rest angle   | likewise                 | `ankle_deg`, `toe_deg`, or `schedule`  |
     | weak      | the action's, weak plantarflexor | the action's             | `strength` [0.1..0.6]                  |
     | drop      | the action's, slack in swing     | the action's             |                                        |
+
+    With `drawn_feet`, such as `[{"foot": "rigid", "on": "one", "weight": 2}, {"foot": {"kind": "passive",
+    "ankle_stiffness": [150, 1500]}, "on": "both"}]`, every episode draws its feet, by the weights: on one side, either
+    with equal chance, on both, on the left or on the right. Pairs of numbers are ranges to draw from, of stiffness and
+    damping on the log scale. The options `left_foot` and `right_foot` of a reset set feet once.
 
     ## Observation space
     `Box(Min, Max, (43,), float32)`, dimensionless: each value is divided by its unit and clipped to its bounds. l is
@@ -150,6 +155,8 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
     With `height_range`, `mass_range` or `speed_range` every episode draws its own body or speed; `options` may set them
     once: `{"height": 1.85, "mass": 95, "speed": 1.4}`. All scales with the body as mechanics do, and is linear between
     walks tabulated every 0.1 m/s. With `speed_interval` the commanded speed, which is observed, goes to new ones.
+    With `drawn_bodies`, such as `[{}, {"leg_ratio": 1.03}, {"carried_ratio": 0.2, "weight": 3}]`, every episode draws
+    its own proportions and load; the option `body` is an index in it.
 
     ## Episode end
     Termination: the hip is lower than 0.65 m (x height / 1.70 m), the trunk is tilted by more than 0.8 rad, or the
@@ -194,9 +201,11 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
     | `carried_ratio`           | `0.0`           | mass of a load on the back over body mass                          |
     | `height_range`            | `None`          | heights drawn at each reset [m], in place of `height`              |
     | `mass_range`              | `None`          | body masses drawn at each reset [kg], in place of `mass`           |
+    | `drawn_bodies`            | `None`          | proportions, loads drawn at each reset; see Starting state         |
     | **feet**                  |                 |                                                                    |
     | `left_foot`               | `"intact"`      | a kind of foot, or `{"kind": ...}` with its numbers; see Feet      |
     | `right_foot`              | `"intact"`      | likewise                                                           |
+    | `drawn_feet`              | `None`          | feet drawn at each reset; see Feet                                 |
     | **speed**                 |                 |                                                                    |
     | `speed`                   | `1.2`           | commanded speed [m/s]                                              |
     | `speed_range`             | `None`          | speeds drawn at each reset [m/s], in place of `speed`              |
@@ -280,10 +289,10 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray, dict[str, Any]]:
-        """Start an episode; `options` may set its `start`, `height`, `mass` and `speed` (see Starting state)."""
+        """Start an episode; `options` may set its `start`, body, speed and feet (see Starting state)."""
         chosen = check_options(options)
         super().reset(seed=check_seed(seed))
-        self.biped.reset(np.array([0]), [self.np_random], chosen.get("start"), bodies_and_speeds(chosen, 1))
+        self.biped.reset(np.array([0]), [self.np_random], chosen.get("start"), given_walkers(chosen, 1))
         self._over = False
         if self.render_mode == "human":
             self.render()

@@ -12,10 +12,11 @@ from springfoot.arrays import NDArray
 from springfoot.errors import SpringfootError, quoted
 
 from .batch.biped_batch import Biped
-from .control.subjects import DRAWN
+from .control.subjects import GIVEN
 from .physics.rendering import RENDER_MODES, Camera
 from .physics.timing import ACTION_STEP
 from .settings.checks import check_start, real_numbers
+from .settings.feet import FOOT_SETTINGS, foot_setting
 from .settings.settings import BipedSettings
 
 METADATA: dict[str, Any] = {"render_modes": list(RENDER_MODES), "render_fps": round(1 / ACTION_STEP)}
@@ -77,10 +78,10 @@ def spaces_of(biped: Biped) -> tuple[Box, Box]:
 def check_options(options: dict[str, Any] | None, further: tuple[str, ...] = ()) -> dict[str, Any]:
     """Return the options of a reset, none for None; raise `SpringfootError` for an unknown one or a bad start.
 
-    `further` are names of options beside `start` and those of `DRAWN`, which this interface allows.
+    `further` are names of options beside `start` and those of `GIVEN`, which this interface allows.
     """
     options = {} if options is None else options
-    allowed = ("start", *DRAWN, *further)
+    allowed = ("start", *GIVEN, *further)
     if not isinstance(options, Mapping):
         raise SpringfootError(f"reset options must be a dictionary, got {quoted(options)}")
     for name in options:
@@ -91,14 +92,16 @@ def check_options(options: dict[str, Any] | None, further: tuple[str, ...] = ())
     return options
 
 
-def bodies_and_speeds(options: dict[str, Any], num: int) -> dict[str, NDArray]:
-    """Return the heights, masses and speeds in the options of a reset, by the names of `DRAWN`: (N,), N being `num`.
+def given_walkers(options: dict[str, Any], num: int) -> dict[str, NDArray]:
+    """Return bodies, speeds and feet in the options of a reset, by the names of `GIVEN`: (N,), N being `num`.
 
-    Raises `SpringfootError` for a value that is neither a number nor one for each environment.
+    Raises `SpringfootError` for a value that is neither a number (a foot) nor one for each environment.
     """
     given = {}
-    for name in DRAWN:
-        if name in options:
+    for name in GIVEN:
+        if name in FOOT_SETTINGS and name in options:
+            given[name] = _feet_of_all(name, options[name], num)
+        elif name in options:
             try:
                 given[name] = np.broadcast_to(real_numbers(name, options[name]), (num,))
             except ValueError:
@@ -107,6 +110,18 @@ def bodies_and_speeds(options: dict[str, Any], num: int) -> dict[str, NDArray]:
                     f"got {quoted(options[name])}"
                 ) from None
     return given
+
+
+def _feet_of_all(name: str, feet: Any, num: int) -> NDArray:
+    """Return the feet of N environments, (N,) of `FootSetting`, from the reset option `name`: a foot, or a list."""
+    listed = feet if isinstance(feet, (list, tuple, np.ndarray)) else [feet] * num
+    if len(listed) != num:
+        raise SpringfootError(
+            f"reset option {name!r} must be a foot, or a list of one for each of {num} environments, got {quoted(feet)}"
+        )
+    checked = np.empty(num, object)
+    checked[:] = [foot_setting(f"reset option {name!r}", foot) for foot in listed]
+    return checked
 
 
 def check_render_mode(mode: str | None) -> str | None:

@@ -15,7 +15,7 @@ from springfoot.errors import MOST_THREADS, SpringfootError, require_count
 
 from .batch.biped_batch import Biped
 from .batch.step_result import INFO, StepResult, report_start
-from .gym_face import METADATA, Face, bodies_and_speeds, check_options, check_render_mode, spaces_of
+from .gym_face import METADATA, Face, check_options, check_render_mode, given_walkers, spaces_of
 from .settings.checks import MOST_ENVIRONMENTS, check_seed
 from .settings.feet import foot_pairs
 from .settings.settings import BipedSettings, settings_from
@@ -88,10 +88,10 @@ class SegmentedFootBipedVector(  # pyright: ignore[reportIncompatibleVariableOve
         """Start episodes in all environments, or in those of `options["reset_mask"]`, a bool array (N,).
 
         A `seed` s gives environment i the seed s + i; a list gives each environment its own. Other `options` are as in
-        the Env; `height`, `mass` and `speed` may also be (N,) arrays.
+        the Env; `height`, `mass`, `speed` and `body` may also be (N,) arrays, feet a list of N.
         """
         chosen = check_options(options, ("reset_mask",))
-        given = bodies_and_speeds(chosen, self.num_envs)
+        given = given_walkers(chosen, self.num_envs)
         mask = self._reset_mask(chosen.get("reset_mask"))
         ids = np.flatnonzero(mask)
         seeds = self._seeds_of_all(seed)
@@ -152,7 +152,7 @@ class SegmentedFootBipedVector(  # pyright: ignore[reportIncompatibleVariableOve
         self, ids: NDArray, start: float | str | None = None, given: Mapping[str, NDArray] | None = None
     ) -> None:
         """Begin episodes in environments `ids` (K,); `start` as in the options, `given` (N,) by the names of
-        `DRAWN`."""
+        `GIVEN`."""
         given = {name: values[ids] for name, values in (given or {}).items()}
         self.biped.reset(ids, [None] * len(ids), start, given)  # each goes on with its generator
 

@@ -1,4 +1,4 @@
-"""Read and write JSON files: an object in braces, small enough for the memory, with a fitting digest if it has one."""
+"""Read and write JSON files: an object or array, small enough for the memory, with a fitting digest if it has one."""
 
 import json
 from collections.abc import Mapping
@@ -26,15 +26,28 @@ def read_object(path: Path, kind: str) -> dict[str, Any]:
 
     Raises `SpringfootError` for any other file; the message calls it no `kind` ("FILE is no policy's settings").
     """
-    content = read_bytes(path, MOST_JSON_BYTES)
-    require_unchanged(path, content)
-    try:
-        value = json.loads(content, object_pairs_hook=keys_once, parse_float=_finite, parse_constant=_finite)
-    except (ValueError, RecursionError) as error:
-        raise SpringfootError(f"{path} is no {kind}: it is not JSON, {json_fault(error)}") from None
+    value = _read(path, kind)
     if not isinstance(value, dict):
         raise SpringfootError(f"{path} is no {kind}: it must be an object in braces")
     return {name: entry for name, entry in value.items() if name != DIGEST}
+
+
+def read_array(path: Path, kind: str) -> list[Any]:
+    """Return the array in a JSON file; raise `SpringfootError` for any other file, as `read_object` does."""
+    value = _read(path, kind)
+    if not isinstance(value, list):
+        raise SpringfootError(f"{path} is no {kind}: it must be an array in brackets")
+    return value
+
+
+def _read(path: Path, kind: str) -> Any:
+    """Return the value in a JSON file; raise `SpringfootError` for any other file."""
+    content = read_bytes(path, MOST_JSON_BYTES)
+    require_unchanged(path, content)
+    try:
+        return json.loads(content, object_pairs_hook=keys_once, parse_float=_finite, parse_constant=_finite)
+    except (ValueError, RecursionError) as error:
+        raise SpringfootError(f"{path} is no {kind}: it is not JSON, {json_fault(error)}") from None
 
 
 def keys_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

@@ -8,11 +8,12 @@ import random
 from collections import deque
 from collections.abc import Mapping
 from math import isfinite
-from typing import Any, TypedDict
+from typing import Any, NotRequired, TypedDict
 
 import numpy as np
 import torch
 
+from springfoot.envs.batch.exact_state import FEET
 from springfoot.errors import SpringfootError, require_count
 
 from .ppo import Learner
@@ -36,6 +37,8 @@ class Learning(TypedDict):
 
     generators: list[dict[str, Any]]
     """State of each environment's random generator."""
+    feet: NotRequired[list[list[Any]]]
+    """Drawn feet of each environment in JSON values, where `drawn_feet` draws some."""
     actions: dict[str, Any]
     """State of the action space's random generator."""
     numpy: list[float]
@@ -58,7 +61,7 @@ def learning_state(
     normalized = learner.normalized
     assert ppo._last_obs is not None and ppo._last_episode_starts is not None and ppo.ep_info_buffer is not None
     simulation = environments.state()
-    generators = simulation.pop("generators")
+    json_values = {name: simulation.pop(name) for name in ("generators", FEET) if name in simulation}
     numpy_state = np.random.get_state(legacy=False)  # noqa: NPY002 - SB3 draws from it
     _, python_words, python_gauss = random.getstate()
     arrays = learner.state() | {f"{_SIMULATION}{name}": values for name, values in simulation.items()}
@@ -71,7 +74,7 @@ def learning_state(
         "random.python": np.array(python_words, np.uint32),
     }
     values = {
-        "generators": generators,
+        **json_values,
         "actions": ppo.action_space.np_random.bit_generator.state,
         "numpy": [int(numpy_state["state"]["pos"]), numpy_state["has_gauss"], numpy_state["gauss"]],  # type: ignore[index]
         "python_gauss": python_gauss,
@@ -103,7 +106,8 @@ def restore_learning(
     try:
         simulation = {name: array for name, array in arrays.items() if name.startswith(_SIMULATION)}
         simulation = {name.removeprefix(_SIMULATION): array for name, array in simulation.items()}
-        environments.restore(simulation | {"generators": values["generators"]})
+        json_values = {name: values[name] for name in ("generators", FEET) if name in values}
+        environments.restore(simulation | json_values)
         width = len(environments.env.biped.observation_names)
         normalized.returns = _checked_array(arrays, "rollout.returns", (ppo.n_envs,), np.float64)
         ppo._last_obs = _checked_array(arrays, "rollout.observation", (ppo.n_envs, width), np.float32)

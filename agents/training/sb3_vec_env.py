@@ -8,7 +8,7 @@ from gymnasium.vector import AutoresetMode
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvStepReturn
 
-from springfoot.envs.control.subjects import DRAWN
+from springfoot.envs.control.subjects import GIVEN
 from springfoot.envs.vector_env import SegmentedFootBipedVector
 from springfoot.errors import SpringfootError
 
@@ -121,15 +121,15 @@ class SegmentedFootBipedVecEnv(VecEnv):
 def _merged(by_environment: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """Return the reset options of the batch, merged from those of each environment, `by_environment`.
 
-    The options of `DRAWN` (bodies and speeds) may differ between environments and become lists; all others must agree.
-    Raises `SpringfootError` otherwise, and for one of `DRAWN` that is given to some environments only.
+    The options of `GIVEN` (bodies, speeds, feet) may differ between environments and become lists; all others must
+    agree. Raises `SpringfootError` otherwise, and for one of `GIVEN` that is given to some environments only.
     """
     merged, *others = (
-        {name: value for name, value in options.items() if name not in DRAWN} for options in by_environment
+        {name: value for name, value in options.items() if name not in GIVEN} for options in by_environment
     )
     if any(other != merged for other in others):
-        raise SpringfootError(f"reset options other than {', '.join(DRAWN)} must be the same for all environments")
-    for name in DRAWN:
+        raise SpringfootError(f"reset options other than {', '.join(GIVEN)} must be the same for all environments")
+    for name in GIVEN:
         values = [options[name] for options in by_environment if name in options]
         if 0 < len(values) < len(by_environment):
             raise SpringfootError(f"reset option {name!r} must be given to all environments, or to none")

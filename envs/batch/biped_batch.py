@@ -8,6 +8,7 @@ of one.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from ..control.reference_walk import rows, walks_of_legs
 from ..control.standing import WALKING, Standing, off_phase
 from ..control.stiffness_control import FootSprings, draw_delay
 from ..control.subjects import Subjects
+from ..control.worn_feet import WornFeet
 from ..physics.contact import CONTACTS
 from ..physics.foot import Feet
 from ..physics.measurement import Measurement
@@ -30,7 +32,8 @@ from ..physics.model import ACTIONS, JOINTS, PERSON_ACTIONS, SIDES
 from ..physics.simulation import MjData, MjModel, Simulation
 from ..physics.timing import CONTROL_WINDOW, WINDOWS_PER_STEP
 from ..settings.checks import real_numbers
-from ..settings.settings import BipedSettings
+from ..settings.drawn import OWN_FEET
+from ..settings.settings import BipedSettings, settings_of_bodies
 from ..task.episode_end import reasons_of
 from ..task.ground import Ground
 from ..task.initial_state import place, random_phase, start_table, walking_posture
@@ -56,7 +59,7 @@ class Biped(ExactState):
         rest: (V, SAMPLES, 2) rest angles of the foot springs in place of the settings' [rad], one for each of `legs`.
         model: a custom model, as for `Simulation`.
         slope: constants for slopes in place of the committed ones.
-        feet: N pairs, the feet of each body in place of the settings'.
+        feet: N pairs, the feet of each body in place of the settings' `left_foot` and `right_foot`.
         right_legs: V sets of constants for the right legs; phase, trunk and speed still follow `legs`.
     """
 
@@ -90,30 +93,41 @@ class Biped(ExactState):
         self._acts_as_person = settings.acts != "stiffness"
         self.action_names = ACTIONS * self._acts_on_stiffness + PERSON_ACTIONS * self._acts_as_person
         """Name of each action, those of the stiffness first."""
-        self.walks, self.right_walks = walks_of_legs(settings, legs, right_legs)
-        """Reference walks of the left legs at each tabulated speed; those of the right legs, none if they are the
-        same."""
+        walks = [walks_of_legs(of_body, legs, right_legs) for of_body in settings_of_bodies(settings)]
+        self.walks, self.right_walks = walks[0]
+        """Reference walks of the left legs at each tabulated speed; those of the right legs, none if they are the same.
+        They, and all that follows from them here, are of the settings' body, or of the first of `drawn_bodies`."""
         walk_at_speed = next(walk for walk in self.walks if walk.speed == settings.speed)
         self.body = walk_at_speed.body
         self.target = walk_at_speed.target
         self.plan = walk_at_speed.plan
         self.constants = walk_at_speed.constants
-        table = list(rows(self.walks))
-        right = list(rows(self.right_walks))
+        table = [row for of_body, _ in walks for row in rows(of_body)]
+        right = [row for _, of_body in walks for row in rows(of_body)]
         speeds = np.array([walk.speed for walk in self.walks])
-        self.subjects = Subjects(settings, speeds, num_envs, variant)
-        feet = feet or [settings.feet] * num_envs
+        self.subjects = Subjects(settings, speeds, num_envs, variant, len(self.constants))
+        self._worn = WornFeet(settings, feet or [settings.feet] * num_envs)
         incline = slope_table(slope or slope_constants())
         self._legs = LegController(table, self.subjects, right)
         planned, stiffness = foot_tables(settings, (*table, *right))
-        # Tables have a row for each variant and speed, and as many again for right legs of their own.
-        rest = planned if rest is None else np.tile(np.repeat(rest, len(speeds), axis=0), (2 if right else 1, 1, 1))
-        self._springs = FootSprings(settings, self.body, rest, stiffness, self.subjects, feet)
+        # Tables have a row for each body, variant and speed, and as many again for right legs of their own.
+        tables = len(walks) * (2 if right else 1)
+        rest = planned if rest is None else np.tile(np.repeat(rest, len(speeds), axis=0), (tables, 1, 1))
+        self._springs = FootSprings(settings, rest, stiffness, self.subjects, self._worn)
         self._decisions = DecisionTimes(settings, self.target, self.subjects.rows)
         self._start = start_table(table)
         starts_or_stops = settings.start == "standing" or settings.stop_at is not None
         self._standing = Standing(settings, self.subjects) if starts_or_stops else None
-        self._simulation = Simulation(self.body, num_envs, num_threads, model, settings.friction, feet)
+        self._simulation = Simulation(
+            self.body,
+            num_envs,
+            num_threads,
+            model,
+            settings.friction,
+            self._worn.pairs,
+            one_way=self._worn.one_way,
+            loaded=any(of_body.carried_ratio > 0.0 for of_body in settings_of_bodies(settings)),
+        )
         self._person = PersonActions(settings, self.subjects.rows)
         self._learned = None if settings.person == "tuned" else LearnedPerson(settings.person, settings.guide)
         self._task = Task(settings, table, self.subjects, self._simulation.feet)
@@ -143,6 +157,8 @@ class Biped(ExactState):
         )
         self._physics = tuple(self._simulation.arrays)
         self._kept = {"control": self.subjects.rows, "task": self._task.rows} | self._simulation.kept
+        if settings.drawn_bodies is not None:
+            self._kept["proportions"] = self.subjects.proportions
         self._simulation.measure()
 
     @property
@@ -196,7 +212,7 @@ class Biped(ExactState):
         ids: NDArray,
         seeds: Sequence[int | np.random.Generator | None],
         start: float | str | None = None,
-        given: Mapping[str, NDArray] | None = None,
+        given: Mapping[str, Any] | None = None,
     ) -> None:
         """Begin a new episode in environments `ids`: walking, at a random phase of single support or at a given phase,
         or standing.
@@ -205,9 +221,11 @@ class Biped(ExactState):
             ids: (K,) indices.
             seeds: K seeds, or generators; with None the environment keeps its own generator.
             start: stride phase of the left leg [0, 1), "random" or "standing", in place of the setting.
-            given: (K,) `height` [m], `mass` [kg] or `speed` [m/s], in place of set or drawn ones.
+            given: (K,) `height` [m], `mass` [kg], `speed` [m/s], `body` (index in `drawn_bodies`), `left_foot` or
+                `right_foot` (feet in plain JSON values), in place of set or drawn ones.
 
-        Raises `SpringfootError` for an impossible body, or a standing start that the settings do not allow.
+        Raises `SpringfootError` for an impossible body, for feet that the batch cannot wear, or a standing start that
+        the settings do not allow.
         """
         if len(ids) == 0:
             return
@@ -216,6 +234,8 @@ class Biped(ExactState):
             raise SpringfootError(
                 f"a reset can start 'standing' where the setting start is 'standing' too, got {self.settings.start!r}"
             )
+        self.subjects.check(given)
+        self._worn.check(given)
         phase = np.empty(len(ids))
         noise = np.zeros((len(ids), 2, len(SIDES), len(JOINTS)))
         randoms: list[np.random.Generator] = []
@@ -234,7 +254,8 @@ class Biped(ExactState):
                 noise[row] = self.settings.start_noise * random.standard_normal(noise.shape[1:])
             self._pushes.reset(index, random)
             randoms.append(random)
-        self._fit(self.subjects.reset(ids, randoms, given))
+        embodied = self.subjects.reset(ids, randoms, given)
+        self._fit(embodied, self._worn.put_on(ids.tolist(), self._worn.draw(randoms, given)))
         self._legs.reset(ids, phase)
         self._ground.reset(ids, randoms, self._legs.phase)
         self._springs.reset(ids, [draw_delay(self.settings, random) for random in randoms])
@@ -248,16 +269,33 @@ class Biped(ExactState):
         place(self._simulation, self.subjects, ids, posture, noise)
         self._task.reset(ids, self._simulation.measure(ids).velocity)
 
-    def _fit(self, ids: list[int]) -> None:
-        """Give environments `ids` the bodies of their subjects, and every leg its commanded speed."""
-        if ids:
+    def _fit(self, embodied: list[int], shod: list[int]) -> None:
+        """Give the environments `embodied` the bodies of their subjects, those `shod` their feet, and every leg its
+        commanded speed."""
+        if ids := sorted({*embodied, *shod}):
             bodies = [self.subjects.bodies[index] for index in ids]
-            self._simulation.fit(ids, bodies)
+            self._simulation.fit(ids, bodies, [self._worn.pairs[index] for index in ids])
             self._task.fit(ids)
+            self._fit_springs(ids)
         self._legs.follow()
 
-    def _embody(self, ids: NDArray, height: NDArray, mass: NDArray) -> None:
-        self._fit(self.subjects.embody(ids, height, mass))
+    def _fit_springs(self, ids: list[int]) -> None:
+        if self._springs.fit(ids):
+            self._tables = tuple(Tables(*self._tables)._replace(feet=self._springs.feet))
+
+    def _embody(self, ids: NDArray, numbers: Mapping[str, NDArray], feet: Any) -> None:
+        replaced = [OWN_FEET] * len(ids) if feet is None else self._worn.from_json(feet, len(ids))
+        height, mass = (numbers[f"control.subject.{name}"] for name in ("height", "mass"))
+        proportions = numbers.get("proportions", np.zeros(len(ids), int))
+        embodied = self.subjects.embody(ids, height, mass, proportions)
+        self._fit(embodied, self._worn.put_on(ids.tolist(), replaced))
+
+    def _embodied(self, ids: NDArray) -> None:
+        self._fit_springs(ids.tolist())  # lines of another batch may have other numbers
+
+    def _feet_of(self, ids: NDArray) -> list[Any] | None:
+        replaced = self._worn.to_json(ids.tolist())
+        return replaced if self.settings.drawn_feet or any(any(pair) for pair in replaced) else None
 
     def observe(self) -> NDArray:
         """Return the present observation (N, D), float32."""

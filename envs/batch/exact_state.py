@@ -9,6 +9,9 @@ import numpy as np
 from springfoot.arrays import NDArray
 from springfoot.errors import SpringfootError
 
+FEET = "feet"
+"""Entry of a state with drawn and given feet."""
+
 
 class ExactState(ABC):
     """Save and restore the state of N environments; pickle and deepcopy make the batch anew and use both.
@@ -24,8 +27,19 @@ class ExactState(ABC):
     """(N,) the generator of each environment."""
 
     @abstractmethod
-    def _embody(self, ids: NDArray, height: NDArray, mass: NDArray) -> None:
-        """Give environments `ids` (K,) bodies of `height` (K,) [m] and `mass` (K,) [kg]."""
+    def _embody(self, ids: NDArray, numbers: Mapping[str, NDArray], feet: Any) -> None:
+        """Give environments `ids` (K,) the bodies of the state's `numbers`, and its `feet`, their own if None.
+
+        Raises `SpringfootError`, with nothing changed, for feet that do not fit.
+        """
+
+    @abstractmethod
+    def _embodied(self, ids: NDArray) -> None:
+        """Write anew the numbers of environments `ids` (K,) that depend on the batch, after a state's were put in."""
+
+    @abstractmethod
+    def _feet_of(self, ids: NDArray) -> list[Any] | None:
+        """Return K pairs of feet in JSON values that replace those of environments `ids` (K,); None if none can."""
 
     @property
     def generators(self) -> list[np.random.Generator | None]:
@@ -36,11 +50,14 @@ class ExactState(ABC):
     def state(self, ids: NDArray | None = None) -> dict[str, Any]:
         """Return the exact state of environments `ids` (K,), of all if None, between two steps.
 
-        Arrays (K, ...) by name, copies; and `generators`, K states of NumPy's bit generators in JSON values.
+        Arrays (K, ...) by name, copies; and `generators`, K states of NumPy's bit generators in JSON values. Where feet
+        are drawn or given, `feet` are K pairs of them in JSON values, None for an environment's own.
         """
         chosen = np.arange(len(self._random)) if ids is None else ids
         generators = [None if random is None else random.bit_generator.state for random in self._random]
         state: dict[str, Any] = {name: values[chosen] for name, values in self._numbers()}
+        feet = self._feet_of(chosen)
+        state |= {} if feet is None else {FEET: feet}
         return state | {"generators": [generators[index] for index in chosen.tolist()]}
 
     def restore(self, state: Mapping[str, Any], ids: NDArray | None = None) -> None:
@@ -53,7 +70,9 @@ class ExactState(ABC):
         chosen = np.arange(len(self._random)) if ids is None else ids
         numbers = dict(self._numbers())
         expected = {name: (len(chosen), *values.shape[1:]) for name, values in numbers.items()}
-        for name in {*expected, "generators"} ^ set(state):  # names that only one of the two has
+        # Feet that a reset gave are in the state alone, and none are in it where they are the environments' own.
+        optional = {FEET} if self._arguments["settings"].drawn_feet is None else set()
+        for name in ({*expected, "generators", FEET} ^ set(state)) - optional:  # names that only one of the two has
             raise SpringfootError(f"the state does not fit these settings: {name!r} is in one of them only")
         for name, shape in expected.items():
             if np.shape(state[name]) != shape:
@@ -66,9 +85,10 @@ class ExactState(ABC):
                 _generator(None, generator_state)  # raises for a bad one
         except (AttributeError, KeyError, TypeError, ValueError) as error:  # the first: NumPy has no such generator
             raise SpringfootError(f"the state does not fit: {' '.join(str(error).split())}") from None
-        self._embody(chosen, restored["control.subject.height"], restored["control.subject.mass"])
+        self._embody(chosen, restored, state.get(FEET))
         for name, values in numbers.items():
             values[chosen] = restored[name]
+        self._embodied(chosen)
         for index, generator_state in zip(chosen.tolist(), state["generators"], strict=True):
             self._random[index] = _generator(self._random[index], generator_state)
 

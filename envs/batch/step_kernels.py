@@ -114,7 +114,7 @@ def begin_step(rows, bodies, tables, springs, factor, walking, fixed) -> None:
         rows: `EnvironmentRows`, as a plain tuple.
         bodies: (N,) of `BODY_ROW`, as measured now.
         tables: `Tables`, as a plain tuple.
-        springs: (1,) of `SPRING_OPTIONS`.
+        springs: (N,) of `SPRING_OPTIONS`.
         factor: (N, 4) factors of the actions on the stiffness [-].
         walking: (N,) bool, environments with moving springs and phase.
         fixed: (N,) bool, walking environments with the fixed stiffness.

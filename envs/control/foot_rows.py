@@ -90,11 +90,19 @@ def _schedules(feet: Sequence[Feet]) -> list[StiffnessSchedule]:
     return list(dict.fromkeys(foot.schedule for pair in feet for foot in pair if foot.schedule))
 
 
-def foot_rows(settings: BipedSettings, feet: Sequence[Feet]) -> NDArray:
-    """Return the muscles and devices of N pairs of feet, (N,) of `FOOT`; `settings` say which joints actions set."""
+def has_lines_of(known: Sequence[Feet], feet: Sequence[Feet]) -> bool:
+    """Return whether the tables of the `known` pairs have every line and every schedule of these `feet`."""
+    return {*_tables(known)} >= {*_tables(feet)} and {*_schedules(known)} >= {*_schedules(feet)}
+
+
+def foot_rows(settings: BipedSettings, feet: Sequence[Feet], known: Sequence[Feet] | None = None) -> NDArray:
+    """Return the muscles and devices of N pairs of feet, (N,) of `FOOT`; `settings` say which joints actions set.
+
+    `known` are the pairs that the tables were made of (`foot_lines`), these `feet` by default.
+    """
     rows = np.zeros(len(feet), FOOT)
-    tables = _tables(feet)
-    schedules = _schedules(feet)
+    tables = _tables(known or feet)
+    schedules = _schedules(known or feet)
     rows["line"] = -1  # no line, no schedule
     rows["curve"] = -1
     set_by_actions = [settings.stiffness_joints in ("both", name) for name in ("ankle", "toe")]

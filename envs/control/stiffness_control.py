@@ -15,16 +15,16 @@ from springfoot.arrays import NDArray
 from springfoot.gait.body.body import Body
 from springfoot.gait.body.tissue import TENDON_SHARE
 
-from ..physics.foot import Feet
 from ..physics.kernel import kernel, part
 from ..physics.model import ANKLE, KNEE
 from ..physics.muscles import tissue_stiffness
 from ..physics.timing import CONTROL_WINDOW
 from ..settings.settings import BipedSettings
-from .foot_rows import device, foot_lines, foot_rows
+from .foot_rows import device, foot_lines, foot_rows, has_lines_of
 from .phase_table import PhaseTable, read
 from .state import PLACE
 from .subjects import Subjects
+from .worn_feet import WornFeet
 
 FEET = slice(ANKLE, None)
 """Ankle and toe along the joint axis: the joints with stiffness set by an action."""
@@ -75,7 +75,7 @@ SPRING_OPTIONS = np.dtype(
         ("held", np.int64),  # 1 if the rest angles are those of the phases at which K was set
     ]
 )
-"""Settings of the springs; stiffness is that of the tables' body."""
+"""Settings of the springs of one environment; stiffness is that of the tables' body."""
 
 
 @part
@@ -89,14 +89,14 @@ def stiffen(rows, bodies, schedule, options, factor, walking, fixed) -> None:
         rows: (N,) of `CONTROL_ROW`; `springs` is changed.
         bodies: (N,) of `BODY_ROW`, as measured now.
         schedule: (R, SAMPLES, 2, 2) fixed stiffness of ankle and toe [N m/rad], of a `PhaseTable`.
-        options: (1,) of `SPRING_OPTIONS`.
+        options: (N,) of `SPRING_OPTIONS`.
         factor: (N, 4) factors of the actions on the stiffness [-].
         walking: (N,) bool; the springs of other bodies do not change.
         fixed: (N,) bool, the bodies that take the schedule in place of the action's stiffness.
     """
     scheduled = np.empty(2)
-    option = options[0]
     for i in range(len(rows)):
+        option = options[i]
         springs = rows[i].springs
         subject = rows[i].subject
         angle = bodies[i].measured.angle
@@ -215,15 +215,15 @@ def move(rows, bodies, control, rest, incline, feet, options, walking) -> None:
             torques [N m] that act beside the springs: each shifts the rest angle by torque / K.
         incline: (1, SAMPLES, 2, 4) their change on a slope, per radian (`envs.control.legs.slope_table`).
         feet: `envs.control.foot_rows.FootLines`, as a plain tuple.
-        options: (1,) of `SPRING_OPTIONS`.
+        options: (N,) of `SPRING_OPTIONS`.
         walking: (N,) bool; the springs of other bodies do not change.
     """
     planned = np.empty(rest.shape[-1])
     inclined = np.empty(4)
-    option = options[0]
     feeds = rest.shape[-1] > 2  # torques beside the springs
     first_row = np.zeros(1, PLACE)[0]
     for i in range(len(rows)):
+        option = options[i]
         springs = rows[i].springs
         foot = rows[i].feet
         subject = rows[i].subject
@@ -310,44 +310,63 @@ class FootSprings:
 
     Args:
         settings: ranges of stiffness, action mode, equilibrium.
-        body: body of the tables.
         equilibrium: (R, SAMPLES, 2) rest angles over the stride [rad], one for each row of the tables; or (R, SAMPLES,
             4), torques beside the springs [N m] behind them.
         schedule: (R, SAMPLES, 2) fixed stiffness [N m/rad], which a residual action multiplies.
         subjects: bodies and commanded speeds.
-        feet: N pairs of feet in place of the settings' feet.
+        worn: the feet; the settings' if None.
     """
 
     def __init__(
         self,
         settings: BipedSettings,
-        body: Body,
         equilibrium: NDArray,
         schedule: NDArray,
         subjects: Subjects,
-        feet: Sequence[Feet] | None = None,
+        worn: WornFeet | None = None,
     ):
-        feet = feet or [settings.feet] * len(subjects.rows)
-        subjects.rows["feet"] = foot_rows(settings, feet)
-        self.feet = tuple(foot_lines(feet))
+        num = len(subjects.rows)
+        self._settings = settings
+        self._subjects = subjects
+        self._worn = worn or WornFeet(settings, [settings.feet] * num)
+        self._known = self._worn.known
+        self.feet = tuple(foot_lines(self._known))
         """`FootLines`, as a plain tuple for kernels."""
         self._residual = settings.action_mode == "residual"
-        middle, factor = _log_scale(settings, body)
+        _, factor = _log_scale(settings, subjects.bodies[0])
         self.factor_at_one = np.tile(factor, 2)
         """(4,) factor of an action of 1 on the stiffness at action 0, where no schedule sets it [-]."""
+        self.options = np.zeros(num, SPRING_OPTIONS)
+        """(N,) of `SPRING_OPTIONS`."""
         scheduled = [self._residual or settings.stiffness_joints not in ("both", joint) for joint in ("ankle", "toe")]
-        follows = settings.equilibrium in ("planned", "angle")
-        held = settings.equilibrium == "phase"
-        tendon = np.inf if settings.ankle_tendon is None else TENDON_SHARE * settings.ankle_tendon
-        scale = body.stiffness_scale
-        self.options = np.array([(middle, tendon * scale, scale, scheduled, follows, held)], SPRING_OPTIONS)
-        """(1,) of `SPRING_OPTIONS`."""
+        self.options["scheduled"] = scheduled
+        self.options["follows"] = settings.equilibrium in ("planned", "angle")
+        self.options["held"] = settings.equilibrium == "phase"
+        self.fit(range(num))
         self.rest = PhaseTable(equilibrium)
         self.schedule = PhaseTable(schedule)
-        self._subjects = subjects
         self._springs = subjects.rows["springs"]
         self._springs["fresh"] = 1
         self._springs["acts"] = 1.0
+
+    def fit(self, ids: Sequence[int]) -> bool:
+        """Take over the present feet and proportions of environments `ids` (K,); return True if `feet` is another
+        one."""
+        tendon = np.inf if self._settings.ankle_tendon is None else TENDON_SHARE * self._settings.ankle_tendon
+        for index in ids:
+            body = self._subjects.home(index)
+            middle, _ = _log_scale(self._settings, body)
+            scale = body.stiffness_scale
+            self.options[["middle", "tendon", "tissue"]][index] = middle, tendon * scale, scale
+        pairs = self._worn.pairs
+        new_lines = not has_lines_of(self._known, [pairs[index] for index in ids])
+        if new_lines:  # those of feet that a reset has given
+            self._known = [*self._worn.known, *pairs]
+            self.feet = tuple(foot_lines(self._known))
+            ids = range(len(pairs))
+        feet = foot_rows(self._settings, [pairs[index] for index in ids], self._known)
+        self._subjects.rows["feet"][list(ids)] = feet
+        return new_lines
 
     def reset(self, ids: NDArray, delay: ArrayLike = 0) -> None:
         """Begin an episode of springs `ids` (K,).

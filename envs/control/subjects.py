@@ -8,6 +8,7 @@ tables between the two speeds nearest to its own Froude speed.
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import radians, sqrt
+from typing import Any
 
 import numpy as np
 
@@ -16,11 +17,15 @@ from springfoot.errors import SpringfootError
 from springfoot.gait.body.body import Body
 
 from ..physics.kernel import kernel
-from ..settings.settings import BipedSettings, body_of
+from ..settings.drawn import draw_index
+from ..settings.feet import FOOT_SETTINGS
+from ..settings.settings import BipedSettings, body_of, settings_of_bodies
 from .state import CONTROL_ROW
 
 DRAWN: tuple[str, ...] = ("height", "mass", "speed")
 """Quantities that can be drawn for each environment: settings `<name>_range`, and options of a reset."""
+GIVEN = (*DRAWN, "body", *FOOT_SETTINGS)
+"""Options of a reset in place of drawn values: those of `DRAWN`, the index of a body of `drawn_bodies`, feet."""
 MOST_DRAWS = 1000
 """Bodies drawn for one reset before it fails; chosen, as few pairs from wide ranges of height and mass make a body."""
 
@@ -75,13 +80,20 @@ class Subjects:
         speeds: (G,) tabulated speeds [m/s], ascending (`envs.control.reference_walk.tabulated_speeds`).
         num: number N of environments.
         variant: (N,) index of each environment's table, if there are several.
+        variants: number of such tables; each body of `drawn_bodies` has as many.
     """
 
-    def __init__(self, settings: BipedSettings, speeds: NDArray, num: int, variant: NDArray | None = None):
+    def __init__(
+        self, settings: BipedSettings, speeds: NDArray, num: int, variant: NDArray | None = None, variants: int = 1
+    ):
         self._settings = settings
-        self._home = body_of(settings)
+        self._homes = [body_of(of_body) for of_body in settings_of_bodies(settings)]
+        self._home = self._homes[0]  # all have the settings' height and mass
         self._speeds = speeds
-        self._first = np.zeros(num, int) if variant is None else np.asarray(variant, int) * len(speeds)
+        self._variant = np.zeros(num, int) if variant is None else np.asarray(variant, int)
+        self._variants = variants
+        self.proportions = np.zeros(num, int)
+        """(N,) index of each environment's body in `drawn_bodies`; 0 without them."""
         self.bodies = [self._home] * num
         """Body of each environment."""
         self.rows = np.zeros(num, CONTROL_ROW)
@@ -105,39 +117,45 @@ class Subjects:
         self._locate(self._everyone)
 
     def reset(
-        self, ids: NDArray, randoms: Sequence[np.random.Generator], given: Mapping[str, NDArray] | None = None
+        self, ids: NDArray, randoms: Sequence[np.random.Generator], given: Mapping[str, Any] | None = None
     ) -> list[int]:
         """Draw a body and a commanded speed for each environment in `ids` (K,).
 
         Args:
             ids: (K,) indices.
             randoms: K generators.
-            given: values (K,) in place of drawn ones, by the names of `DRAWN`.
+            given: values (K,) in place of drawn ones, by the names of `GIVEN`; feet are left to others.
 
         Returns the indices of environments with a changed body, whose model must be rebuilt. Raises `SpringfootError`,
         leaving all state unchanged, for an impossible body or a speed outside the tables.
         """
+        numbers = {name: values for name, values in (given or {}).items() if name not in FOOT_SETTINGS}
         drawn = [
-            self._draw(random, {name: float(values[row]) for name, values in (given or {}).items()})
+            self._draw(random, {name: float(values[row]) for name, values in numbers.items()})
             for row, random in enumerate(randoms)
         ]
-        changed = self._embody(ids, [body for body, _ in drawn])
-        for index, random, (_, speed) in zip(ids.tolist(), randoms, drawn, strict=True):
+        changed = self._embody(ids, [body for body, _, _ in drawn], [proportions for _, proportions, _ in drawn])
+        for index, random, (_, _, speed) in zip(ids.tolist(), randoms, drawn, strict=True):
             self.speed[index] = self.target[index] = speed
             self._change[index] = self._next_change(0.0, random)
         self._locate(ids)
         return changed
 
-    def embody(self, ids: NDArray, height: NDArray, mass: NDArray) -> list[int]:
-        """Give environments `ids` (K,) bodies of `height` (K,) [m] and `mass` (K,) [kg]; return the indices of those
-        with a changed body, as `reset` does."""
+    def embody(self, ids: NDArray, height: NDArray, mass: NDArray, proportions: NDArray) -> list[int]:
+        """Give environments `ids` (K,) bodies of `height` (K,) [m], `mass` (K,) [kg] and `proportions` (K,); return the
+        indices of those with a changed body, as `reset` does."""
+        if not set(proportions.tolist()) <= set(range(len(self._homes))):
+            raise SpringfootError(f"the state does not fit: 'proportions' must be from 0 to {len(self._homes) - 1}")
+        sizes = zip(height.tolist(), mass.tolist(), proportions.tolist(), strict=True)
+        bodies = [replace(self._homes[p], height=h, mass=m) for h, m, p in sizes]
         self._changing = True  # the next step finds out whether a speed has to change
-        sizes = zip(height.tolist(), mass.tolist(), strict=True)
-        return self._embody(ids, [replace(self._home, height=h, mass=m) for h, m in sizes])
+        return self._embody(ids, bodies, proportions.tolist())
 
-    def _embody(self, ids: NDArray, bodies: Sequence[Body]) -> list[int]:
-        """Give environments `ids` (K,) these K bodies; return the indices of those with a changed body."""
+    def _embody(self, ids: NDArray, bodies: Sequence[Body], proportions: Sequence[int]) -> list[int]:
+        """Give environments `ids` (K,) these K bodies with the `proportions` (K,); return the indices of those with a
+        changed body."""
         changed = []
+        self.proportions[ids] = proportions
         for index, body in zip(ids.tolist(), bodies, strict=True):
             if body != self.bodies[index]:
                 changed.append(index)
@@ -184,9 +202,29 @@ class Subjects:
         self._locate(self._everyone)
         return True
 
-    def _draw(self, random: np.random.Generator, given: dict[str, float]) -> tuple[Body, float]:
-        """Draw a speed, then bodies until one is possible; values in `given` are not drawn. Return body and speed."""
+    def home(self, index: int) -> Body:
+        """Return the body of the tables for environment `index`: that of the settings, with its proportions."""
+        return self._homes[self.proportions[index]]
+
+    def check(self, given: Mapping[str, Any] | None) -> None:
+        """Raise `SpringfootError` for a `body` in `given`, as of `reset`, that is no index in `drawn_bodies`."""
+        bodies = self._settings.drawn_bodies
+        for index in (given or {}).get("body", ()):
+            if bodies is None:
+                raise SpringfootError("the reset option body is an index in the setting drawn_bodies, which is None")
+            if index not in range(len(bodies)):
+                raise SpringfootError(
+                    f"the reset option body must be a whole number from 0 to {len(bodies) - 1}, got {index:g}"
+                )
+
+    def _draw(self, random: np.random.Generator, given: dict[str, float]) -> tuple[Body, int, float]:
+        """Draw proportions and speed, then bodies until one is possible; values in `given` replace drawn ones.
+
+        Return body, proportions and speed.
+        """
         settings = self._settings
+        proportions = draw_index(settings.drawn_bodies, random) if settings.drawn_bodies else 0
+        proportions = int(given.pop("body", proportions))
         ranges = {name: getattr(settings, f"{name}_range") for name in DRAWN}
         values = {name: getattr(settings, name) for name in DRAWN}
         if ranges["speed"]:
@@ -196,13 +234,13 @@ class Subjects:
             drawn = {name: random.uniform(*ranges[name]) for name in ("height", "mass") if ranges[name]}
             chosen = values | drawn | given
             try:
-                body = replace(self._home, height=chosen["height"], mass=chosen["mass"])
+                body = replace(self._homes[proportions], height=chosen["height"], mass=chosen["mass"])
                 break
             except SpringfootError:
                 if draws_left == 1 or not drawn.keys() - given.keys():  # another draw would give the same body
                     raise
         self._check(body, values["speed"])
-        return body, values["speed"]
+        return body, proportions, values["speed"]
 
     def _next_change(self, time: float, random: np.random.Generator) -> float:
         """Return the time [s] after `time` at which the next speed is drawn: 0.5 to 1.5 intervals later; inf without
@@ -223,4 +261,5 @@ class Subjects:
 
     def _locate(self, ids: NDArray) -> None:
         """Set the places in the tables of environments `ids` (K,)."""
-        _locate(ids, self._speeds, self._first, self.rows["subject"])
+        first = (self.proportions * self._variants + self._variant) * len(self._speeds)
+        _locate(ids, self._speeds, first, self.rows["subject"])

@@ -128,13 +128,15 @@ def contact_material(body: Body, contact: NDArray, base: NDArray, angle: NDArray
     return contact[..., 0] + turn * [radius for *_, radius in contact_offsets(body).values()]
 
 
-def build_spec(body: Body, friction: float = FRICTION, feet: Feet = SOUND, *, one_way: bool = False) -> mujoco.MjSpec:
+def build_spec(
+    body: Body, friction: float = FRICTION, feet: Feet = SOUND, *, one_way: bool = False, loaded: bool = False
+) -> mujoco.MjSpec:
     """Return the model's specification: 11 degrees of freedom, 16 actuators (stiffness, drive per joint), 6 force
     sensors.
 
     Either foot has a ground of its own, a plane that is moved from outside (mocap). With `one_way`, or an orthosis that
-    acts one way, ankles and toes have a tendon each, slack where there is no such spring: in a batch all models have
-    them, or none.
+    acts one way, ankles and toes have a tendon each, slack where there is no such spring; with `loaded`, or a load, the
+    trunk has a box, without mass and unseen where there is no load: in a batch all models have them, or none.
     """
     length = body.length_scale
     mass = body.mass_scale
@@ -163,7 +165,7 @@ def build_spec(body: Body, friction: float = FRICTION, feet: Feet = SOUND, *, on
         mode=mujoco.mjtCamLight.mjCAMLIGHT_TRACKCOM,
     )
     bone(trunk, (0, 0.0), (0, body.trunk_length), 0.07 * length, 0.0)
-    if body.carried_ratio:
+    if loaded or body.carried_ratio:
         _load(trunk, body)
     for index, side in enumerate(SIDES):
         _leg(trunk, body, side, feet, hip_y=(0.09 if index == LEFT else -0.09) * length)
@@ -203,16 +205,19 @@ def build_spec(body: Body, friction: float = FRICTION, feet: Feet = SOUND, *, on
     return spec
 
 
-def build_model(body: Body, friction: float = FRICTION, feet: Feet = SOUND, *, one_way: bool = False) -> mujoco.MjModel:
+def build_model(
+    body: Body, friction: float = FRICTION, feet: Feet = SOUND, *, one_way: bool = False, loaded: bool = False
+) -> mujoco.MjModel:
     """Return the compiled model of `body` with these feet, as `build_spec` says."""
-    return build_spec(body, friction, feet, one_way=one_way).compile()
+    return build_spec(body, friction, feet, one_way=one_way, loaded=loaded).compile()
 
 
 def _load(trunk, body: Body) -> None:
     """Add the body's load: a box on the back, fixed to the trunk."""
     forward, up = body.carried_com
     load = _segment(trunk, "load", (forward, 0, up), body.carried_mass, (0, 0), body.carried_inertia)
-    box(load, np.array([0.075, 0.15, 0.25]) * body.length_scale)  # half-lengths: forward, sideways, up
+    size = np.array([0.075, 0.15, 0.25]) * body.length_scale  # half-lengths: forward, sideways, up
+    box(load, size, visible=body.carried_ratio > 0.0)
 
 
 def _leg(trunk, body: Body, side: str, feet: Feet, hip_y: float) -> None:

@@ -48,12 +48,12 @@ def bone(segment, start, end, radius: float, shade: float, colour: tuple[float, 
     )
 
 
-def box(segment, size) -> None:
+def box(segment, size, visible: bool = True) -> None:
     """Add a box of half-lengths `size` (3,) [m] to a segment."""
     segment.add_geom(
         type=mujoco.mjtGeom.mjGEOM_BOX,
         size=size,
         contype=0,
         conaffinity=0,
-        rgba=(0.45, 0.50, 0.35, 1.0),
+        rgba=(0.45, 0.50, 0.35, 1.0 if visible else 0.0),
     )

@@ -6,7 +6,7 @@ fields lag one physics step, and the mean contact forces of the window's steps, 
 """
 
 from collections.abc import Sequence
-from functools import partial
+from functools import lru_cache, partial
 from math import cos, sin, tan
 from typing import Any, NamedTuple, TypeAlias
 
@@ -32,6 +32,8 @@ MjData: TypeAlias = Any
 """A `mujoco.MjData`, likewise."""
 
 
+MOST_MODELS = 64
+"""Compiled models that a simulation keeps for bodies and feet to come; chosen, 0.3 MB each."""
 SENSORS = "sensordata"
 """MuJoCo's field of the contact forces."""
 
@@ -61,7 +63,9 @@ class Simulation:
         model: a custom model of that body in place of the default, for instance one whose timestep is another part of
             `CONTROL_WINDOW`.
         friction: coefficient of friction between feet and ground in the default models [-].
-        feet: N pairs, the feet of each simulation; sound ones if None. They stay when `fit` changes the body.
+        feet: N pairs, the feet of each simulation; sound ones if None.
+        one_way: whether `fit` may give a simulation an orthosis that acts one way, even if these `feet` have none.
+        loaded: whether `fit` may give a simulation a load, even if this `body` has none.
     """
 
     def __init__(
@@ -72,13 +76,15 @@ class Simulation:
         model: MjModel | None = None,
         friction: float = FRICTION,
         feet: Sequence[Feet] | None = None,
+        one_way: bool = False,
+        loaded: bool = False,
     ):
         self.body = body
         self.num = num
         self.feet = [SOUND] * num if feet is None else list(feet)
         """The left and the right foot of each simulation."""
-        one_way = any(map(act_one_way, self.feet))  # all models of a batch have the same elements
-        self._build = partial(build_model, friction=friction, one_way=one_way)
+        one_way = one_way or any(map(act_one_way, self.feet))  # all models of a batch have the same elements
+        self._build = lru_cache(MOST_MODELS)(partial(build_model, friction=friction, one_way=one_way, loaded=loaded))
         built = {pair: model or self._build(body, feet=pair) for pair in dict.fromkeys(self.feet)}
         self.model = built[self.feet[0]]
         self.models = [built[pair] for pair in self.feet]
@@ -89,7 +95,6 @@ class Simulation:
             raise SpringfootError("a custom model must have the joints and the actuators of the default one")
         self._custom_model = model is not None
         self._substeps = round(CONTROL_WINDOW / self.model.opt.timestep)
-        self._built = built
         self._batch = Batch(self.model, num, require_count("threads", threads, 1, MOST_THREADS))
         if len(built) > 1:
             self._batch.set_models(self.models)
@@ -121,19 +126,19 @@ class Simulation:
         self.work: WindowWork
         """Torque, work and energy in the last window that was watched."""
 
-    def fit(self, ids: Sequence[int], bodies: Sequence[Body]) -> None:
-        """Simulate `bodies` (K,) in simulations `ids` (K,) from their next reset on.
+    def fit(self, ids: Sequence[int], bodies: Sequence[Body], pairs: Sequence[Feet]) -> None:
+        """Simulate `bodies` (K,) on the feet `pairs` (K,) in simulations `ids` (K,) from their next reset on.
 
         Compiling a model takes about 1.5 ms. Raises `SpringfootError` for a simulation built from a custom model.
         """
         if self._custom_model:
             raise SpringfootError(
-                "cannot change bodies in a simulation built from a custom model; omit `model`, "
-                "or drop height_range and mass_range"
+                "cannot change bodies or feet in a simulation built from a custom model; omit `model`, "
+                "or drop height_range, mass_range, drawn_bodies and drawn_feet"
             )
-        for index, body in zip(ids, bodies, strict=True):
-            feet = self.feet[index]
-            self.models[index] = self._built[feet] if body == self.body else self._build(body, feet=feet)
+        for index, body, feet in zip(ids, bodies, pairs, strict=True):
+            self.feet[index] = feet
+            self.models[index] = self._build(body, feet=feet)
             self.arrays.bodies["segments"][index] = segments_of(body, feet)[0]
             self.arrays.bodies["muscles"]["muscles"][index] = muscles_of(body, feet)[0]
             self._parts[index] = parts_of(body, feet)[0]

@@ -6,7 +6,7 @@ conditions of an evaluation.
 """
 
 import json
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from math import ceil
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -34,6 +34,7 @@ from .checks import (
     refusing_unknown,
     with_python_types,
 )
+from .drawn import DrawnBody, DrawnFoot, drawn_bodies_setting, drawn_feet_setting
 from .feet import FOOT_SETTINGS, INTACT_FOOT, FootSetting, foot_setting
 
 Equilibrium = Literal["planned", "angle", "neutral", "phase"]
@@ -101,6 +102,7 @@ _BODY, _FEET, _SPEED, _REFERENCE, _SPRINGS, _PERSON, _EPISODE, _GROUND, _DISTURB
 )
 _DRAWN = {"drawn": True}  # the setting makes something differ between episodes, or change within one, by chance
 _KEPT = {"kept": True}  # an evaluation keeps the policy's value, although it sets others of the theme anew
+_REPLACED = {"replaced": True}  # an evaluation sets it anew, although it keeps others of the theme
 
 
 @refusing_unknown
@@ -127,12 +129,22 @@ class BipedSettings:
     command line, a file (`springfoot.gait.springs.foot_file`)."""
     right_foot: FootSetting = field(default=INTACT_FOOT, metadata=_FEET)
     """The right foot, likewise."""
+    drawn_feet: tuple[DrawnFoot, ...] | None = field(default=None, metadata=_FEET | _DRAWN | _REPLACED)
+    """Feet of which each reset draws one, in place of `left_foot` or `right_foot`: a list of dictionaries of `foot`, as
+    for `left_foot`, `on` (one, either side with equal chance; both; left; right) and `weight`, the relative chance.
+    Every number of a foot, and of its orthosis, may be a pair [low, high]: stiffness and damping are drawn evenly on
+    the log scale, all else evenly. An evaluation is of `left_foot` and `right_foot`, whatever the policy was trained
+    on."""
     speed: float = field(default=1.2, metadata=_SPEED)
     """Commanded walking speed [m/s]."""
     height_range: tuple[float, float] | None = field(default=None, metadata=_BODY | _DRAWN)
     """Heights drawn at each reset in place of `height` [m], evenly; with the mass anew if they make no body."""
     mass_range: tuple[float, float] | None = field(default=None, metadata=_BODY | _DRAWN)
     """Body masses drawn at each reset in place of `mass` [kg], evenly and whatever the height."""
+    drawn_bodies: tuple[DrawnBody, ...] | None = field(default=None, metadata=_BODY | _DRAWN)
+    """Proportions and loads of which each reset draws one: a list of dictionaries of `leg_ratio`, `foot_ratio`,
+    `carried_ratio` (the settings' where left out) and `weight`, the relative chance. All are tabulated in the
+    beginning."""
     speed_range: tuple[float, float] | None = field(default=None, metadata=_SPEED | _DRAWN)
     """Walking speeds drawn at each reset in place of `speed` [m/s], evenly."""
     speed_interval: float | None = field(default=None, metadata=_SPEED | _DRAWN)
@@ -235,6 +247,8 @@ class BipedSettings:
             check_choice(name, getattr(self, name), get_args(choices))
         for name in FOOT_SETTINGS:
             object.__setattr__(self, name, foot_setting(name, getattr(self, name)))
+        object.__setattr__(self, "drawn_feet", drawn_feet_setting(self.drawn_feet))
+        object.__setattr__(self, "drawn_bodies", drawn_bodies_setting(self.drawn_bodies, body_of(self)))
         check_range("ankle_stiffness_range", self.ankle_stiffness_range, "N m/rad")
         check_range("toe_stiffness_range", self.toe_stiffness_range, "N m/rad")
         if self.schedule is not None and not isinstance(self.schedule, StiffnessSchedule):
@@ -345,7 +359,7 @@ DRAWN_SETTINGS = tuple(item.name for item in fields(BipedSettings) if item.metad
 CONDITION_SETTINGS = tuple(
     item.name
     for item in fields(BipedSettings)
-    if item.metadata["theme"] in CONDITION_THEMES and not item.metadata.get("kept")
+    if (item.metadata["theme"] in CONDITION_THEMES and not item.metadata.get("kept")) or item.metadata.get("replaced")
 )
 """Settings that every evaluation replaces; a trained policy brings the others with it."""
 
@@ -371,6 +385,13 @@ def settings_to_json(settings: BipedSettings) -> dict[str, Any]:
 def body_of(settings: BipedSettings) -> Body:
     """Return the settings' body; raise `SpringfootError` for an impossible one."""
     return Body(settings.height, settings.mass, settings.leg_ratio, settings.foot_ratio, settings.carried_ratio)
+
+
+def settings_of_bodies(settings: BipedSettings) -> tuple[BipedSettings, ...]:
+    """Return the settings with each of `drawn_bodies` as their body; they alone without any."""
+    if settings.drawn_bodies is None:
+        return (settings,)
+    return tuple(replace(settings, drawn_bodies=None, **drawn.ratios) for drawn in settings.drawn_bodies)
 
 
 def plan_file_of(settings: BipedSettings) -> Path | None:

@@ -50,6 +50,8 @@ ELSEWHERE = {
     "episode_seconds": "the walk has no end",
     "height_range": "the slider height sets it",
     "mass_range": "the slider mass sets it",
+    "drawn_bodies": "its proportions stay",
+    "drawn_feet": "the menus set the feet",
     "speed_range": "the slider speed sets it",
     "speed_interval": "the slider speed sets it",
     "slope_range_deg": "the slider slope sets it",

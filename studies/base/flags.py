@@ -16,7 +16,7 @@ import tyro
 
 from springfoot.envs.settings import CONDITION_SETTINGS, FOOT_SETTINGS, THEME_OF, THEMES, BipedSettings
 from springfoot.errors import quoted
-from springfoot.files.json_file import json_fault, keys_once, read_object
+from springfoot.files.json_file import json_fault, keys_once, read_array, read_object
 from springfoot.gait.people import read_gait
 from springfoot.gait.springs import StiffnessSchedule, read_foot
 
@@ -37,16 +37,18 @@ def field_help(settings: type) -> dict[str, str]:
     }
 
 
-def read_json(words: list[str]) -> dict[str, Any]:
-    """Return a dictionary from the first of `words`: JSON text, or the name of a JSON file.
+def read_json(words: list[str], opening: str = "{") -> Any:
+    """Return a dictionary, or with the `opening` bracket a list, from the first of `words`: JSON text, or the name of a
+    JSON file.
 
     Raises `ValueError`, with what is wrong, for any other word.
     """
     text = words[0]
-    if not text.lstrip().startswith("{"):
+    form, read_file = {"{": ("braces", read_object), "[": ("brackets", read_array)}[opening]
+    if not text.lstrip().startswith(opening):
         if not Path(text).is_file():
-            raise ValueError(f"must be JSON text in braces or the name of a JSON file, got {quoted(text)}")
-        return read_object(Path(text), "setting in JSON")
+            raise ValueError(f"must be JSON text in {form} or the name of a JSON file, got {quoted(text)}")
+        return read_file(Path(text), "setting in JSON")
     try:
         value = json.loads(text, object_pairs_hook=keys_once)
     except (ValueError, RecursionError) as error:
@@ -76,9 +78,9 @@ def read_own_gait(words: str, trust_units: bool = False, mass: float | None = No
     return gait.to_json()
 
 
-def _read_json_or_none(may_be_none: bool, words: list[str]) -> dict[str, Any] | None:
-    """Return None for the word `None` if that is allowed, else the dictionary of `read_json`."""
-    return None if may_be_none and words == ["None"] else read_json(words)
+def _read_json_or_none(may_be_none: bool, words: list[str], opening: str = "{") -> Any:
+    """Return None for the word `None` if that is allowed, else the dictionary or list of `read_json`."""
+    return None if may_be_none and words == ["None"] else read_json(words, opening)
 
 
 def _read_word_or_json(words: list[str]) -> str | dict[str, Any]:
@@ -97,6 +99,8 @@ def foot_given(value: str | dict[str, Any]) -> str | dict[str, Any]:
 
 FootFlag = Annotated[str | dict[str, Any], reader_of_words(_read_word_or_json, "WORD|JSON|FILE")]
 """Type of a flag for a foot; `foot_given` converts its value to a setting."""
+LIST_FLAGS = ("drawn_feet", "drawn_bodies")
+"""Settings whose flag is a list in JSON."""
 FILE_FLAGS = {"human": read_own_gait}
 """Setting whose flag is a file's name -> function that reads the setting from the file."""
 
@@ -168,6 +172,8 @@ def _optional_flag(name: str, kind: Any, text: str, hint: str) -> Any:
         reader = reader_of_words(lambda words: words[0], "FILE")
     elif name in FOOT_SETTINGS:
         reader = reader_of_words(_read_word_or_json, "WORD|JSON|FILE")
+    elif name in LIST_FLAGS:
+        reader = reader_of_words(partial(_read_json_or_none, True, opening="["), "JSON|FILE")
     elif get_origin(kind) is not dict and StiffnessSchedule not in parts:
         reader = flag_of(kind)
     else:

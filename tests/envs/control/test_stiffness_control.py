@@ -53,7 +53,7 @@ class Springs:
     """Foot springs and what they act on."""
 
     def __init__(self, settings: BipedSettings, rest: NDArray, schedule: NDArray, subjects: Subjects):
-        self.feet = FootSprings(settings, Body(), rest, schedule, subjects)
+        self.feet = FootSprings(settings, rest, schedule, subjects)
         self.rows, self.everyone = subjects.rows, np.ones(len(subjects.rows), bool)
         self.bodies = np.zeros(len(self.rows), BODY_ROW)
         self.angle = self.bodies["measured"]["angle"]

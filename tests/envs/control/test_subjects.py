@@ -239,7 +239,7 @@ def test_nothing_jumps_as_the_speed_changes():
     legs, task = LegController(table, subjects), Task(settings, table, subjects, [settings.feet])
     legs.reset(np.arange(1), biped.leg_phase[:, 0])
     rest, stiffness = (np.stack(each) for each in zip(*(foot_curves(settings, *row) for row in table), strict=True))
-    springs = FootSprings(settings, biped.body, rest, stiffness, subjects)
+    springs = FootSprings(settings, rest, stiffness, subjects)
     bodies = simulation.arrays.bodies
     control = np.zeros((1, len(SIDES), len(JOINTS), 2))
     for name, values in vars(biped.measurement).items():
