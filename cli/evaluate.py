@@ -89,6 +89,7 @@ def run_evaluation(flags: EvaluateFlags, program: str, command: str = "") -> Non
     if flags.out is not None and is_taken(flags.out):
         raise SpringfootError(f"{flags.out} exists already; give --out a new folder")
     from springfoot.agents.policies.baselines import FROZEN, has_feedback
+    from springfoot.compiling import tell_of_compiling
     from springfoot.evaluation.numbers import metrics
     from springfoot.evaluation.page import (
         report_page,  # not above: Matplotlib takes a while, and bad flags need not wait for it
@@ -97,6 +98,7 @@ def run_evaluation(flags: EvaluateFlags, program: str, command: str = "") -> Non
     from springfoot.evaluation.report import film, gait_table, report
 
     end_in_order()
+    tell_of_compiling()
     settings = {"episode_seconds": flags.seconds} | given(flags.environment)
     if flags.film:
         film.require_film()

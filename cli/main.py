@@ -160,7 +160,10 @@ def study_main(arguments: Sequence[str]) -> int:
 
     def run() -> int:
         """Run the study, which signals end in good order; return the exit code."""
+        from springfoot.compiling import tell_of_compiling
+
         end_in_order()
+        tell_of_compiling()
         return study.run(name)
 
     return exit_code(program, run)

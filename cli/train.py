@@ -156,7 +156,7 @@ def _resume(flags: TrainFlags, settings: dict[str, Any]) -> dict[str, Any]:
 
 def _engine(rllib: bool) -> Any:
     """Import and return the module that trains, with RLlib or stable-baselines3; from here on signals end the command
-    in good order.
+    in good order, and a compilation of kernels is told.
 
     Not imported above: torch takes seconds, and bad flags need not wait for it.
     """
@@ -165,7 +165,10 @@ def _engine(rllib: bool) -> Any:
             from springfoot.agents.training.cluster import rllib_training as module
     else:
         from springfoot.agents.training import training as module
+    from springfoot.compiling import tell_of_compiling
+
     end_in_order()
+    tell_of_compiling()
     return module
 
 
