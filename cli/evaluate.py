@@ -142,8 +142,7 @@ def run_evaluation(flags: EvaluateFlags, program: str, command: str = "") -> Non
     if flags.json:
         print(json.dumps({"folder": str(out), "metrics": [gait.metrics for _, gait in walks]}, ensure_ascii=False))
         return
-    for _, gait in walks:
-        gait_table.print_table(gait.metrics)
+    gait_table.print_tables([gait.metrics for _, gait in walks])
     for name in flags.policies:
         if has_feedback(name):
             open_loop = f"{program} {shlex.quote(f'{FROZEN}:{name}')}"
