@@ -246,7 +246,9 @@ def test_the_command_numbers_its_folders_and_says_where_they_are(command, tmp_pa
     assert code == 0
     assert str(Path("runs", "eval-random-2")) in out
     assert {path.name for path in (tmp_path / "runs").iterdir()} == {"eval-random-1", "eval-random-2"}
-    assert {path.name for path in (tmp_path / "runs" / "eval-random-2").iterdir()} - PARQUET == {*FILES, "report.html"}
+    written = {path.name for path in (tmp_path / "runs" / "eval-random-2").iterdir()}
+    assert written - PARQUET == {*FILES, "report.html"}
+    assert set(out.splitlines()[-1].split(", ")) == written
 
 
 @pytest.mark.slow
