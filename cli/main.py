@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from springfoot import __version__
+from springfoot.errors import perhaps
 from springfoot.extras import EXTRA_OF
 from springfoot.terminal import at_terminal
 
@@ -25,7 +26,9 @@ FIRST = """To begin with:
 
 springfoot --help lists all commands."""
 """Commands that a newcomer types, in their order."""
-HELP = f"""usage: springfoot {{train,evaluate,live,export,study,datasets,examples,completion}} ...
+COMMANDS = ("train", "evaluate", "live", "export", "study", "datasets", "examples", "completion")
+"""Names of all commands."""
+HELP = f"""usage: springfoot {{{",".join(COMMANDS)}}} ...
 
   springfoot train --out FOLDER     train a policy that sets the stiffness of ankles and toes
   springfoot evaluate POLICY        how human is its walk? numbers, curves, pictures; POLICY may be pretrained
@@ -135,7 +138,7 @@ def _run(words: list[str]) -> int:
             file=sys.stderr,
         )
         return 2
-    known = "there are train, evaluate, live, export, study, datasets, examples and completion"
+    known = f"there are {', '.join(COMMANDS)}{perhaps(words[0], COMMANDS)}"
     print(f"springfoot: error: no command {words[0]!r:.60}; {known}", file=sys.stderr)
     return 2
 
@@ -150,7 +153,8 @@ def study_main(arguments: Sequence[str]) -> int:
         print(study_help())
         return 0
     if name not in STUDIES:
-        print(f"springfoot study: error: no study {name!r:.60}; there are {', '.join(STUDIES)}", file=sys.stderr)
+        known = f"there are {', '.join(STUDIES)}{perhaps(name, STUDIES)}"
+        print(f"springfoot study: error: no study {name!r:.60}; {known}", file=sys.stderr)
         return 2
     from springfoot.command_line import end_in_order, exit_code, parse
 
