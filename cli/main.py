@@ -37,7 +37,7 @@ HELP = f"""usage: springfoot {{{",".join(COMMANDS)}}} ...
   springfoot study NAME             hold many walks against each other; springfoot study --help lists them
   springfoot datasets               write Minari sets of walks, for offline learning
   springfoot examples --copy FOLDER copy the programs to start from, for springfoot and other learners
-  springfoot completion SHELL       print the tab completion of all flags for bash, zsh or tcsh
+  springfoot completion SHELL       print the tab completion of commands, policies and flags for bash or zsh
 
 Each takes --help; springfoot --version says which this is.
 Pages that help names, docs/..., lie in {Path(__file__).parents[1]}."""
