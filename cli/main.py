@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from springfoot import __version__
 from springfoot.errors import perhaps
-from springfoot.extras import EXTRA_OF
+from springfoot.extras import EXTRA_OF, missing
 from springfoot.terminal import at_terminal
 
 if TYPE_CHECKING:
@@ -132,11 +132,8 @@ def _run(words: list[str]) -> int:
     except ModuleNotFoundError as error:
         if error.name not in EXTRA_OF:
             raise
-        extra = "train" if words[0] == "train" else EXTRA_OF[error.name]  # `train` needs all of its extra
-        print(
-            f"springfoot {words[0]}: error: the package {error.name} is missing: pip install 'springfoot[{extra}]'",
-            file=sys.stderr,
-        )
+        extra = "train" if words[0] == "train" else ""  # `train` needs all of its extra
+        print(f"springfoot {words[0]}: error: {missing(error.name, extra)}", file=sys.stderr)
         return 2
     known = f"there are {', '.join(COMMANDS)}{perhaps(words[0], COMMANDS)}"
     print(f"springfoot: error: no command {words[0]!r:.60}; {known}", file=sys.stderr)
