@@ -1,15 +1,18 @@
 """Print tab completion for a shell: `springfoot completion bash`."""
 
+import ast
+import io
+import re
 import sys
 from collections.abc import Callable, Sequence
-from contextlib import suppress
+from contextlib import redirect_stdout, suppress
 from dataclasses import make_dataclass
 from importlib import import_module
 from typing import Annotated, Any, Literal, Union, get_args
 
 import tyro
 
-Shell = Literal["bash", "zsh", "tcsh"]
+Shell = Literal["bash", "zsh"]
 """Shells that tyro writes completions for."""
 COMMANDS = {
     "train": "train.TrainFlags",
@@ -45,14 +48,7 @@ def completion_main(arguments: Sequence[str], installed_studies: Callable[[], di
             print(HELP)
             return 0
         case [shell] if shell in get_args(Shell):
-            unprefixed = (tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes)
-            with suppress(SystemExit):  # so tyro ends
-                tyro.cli(
-                    _all_commands(installed_studies()),
-                    prog="springfoot",
-                    args=["--tyro-print-completion", shell],
-                    config=unprefixed,
-                )
+            print(SPECIFICATION.sub(_mended, _script_of_tyro(shell, installed_studies())))
             if shell == "bash":
                 print(FILES_TOO)
         case _:
@@ -63,6 +59,52 @@ def completion_main(arguments: Sequence[str], installed_studies: Callable[[], di
             )
             return 2
     return 0
+
+
+SPECIFICATION = re.compile(r"^COMPLETION_SPEC = (\{.*\})$", re.MULTILINE)
+"""Line of tyro's scripts with the words that they offer, as a Python literal."""
+
+
+def _script_of_tyro(shell: str, studies: dict[str, Any]) -> str:
+    """Return tyro's completion script for a shell; `studies` as in `_all_commands`."""
+    output = io.StringIO()
+    with suppress(SystemExit), redirect_stdout(output):  # tyro prints it and exits
+        tyro.cli(
+            _all_commands(studies),
+            prog="springfoot",
+            args=["--tyro-print-completion", shell],
+            config=(tyro.conf.OmitArgPrefixes, tyro.conf.OmitSubcommandPrefixes),
+        )
+    return output.getvalue()
+
+
+def _mended(line: re.Match[str]) -> str:
+    """Return the line of the specification with names of policies, and with each description on one line.
+
+    The scripts take every line that tyro's Python code prints for a word to offer.
+    """
+    from springfoot.agents.policies.baselines import BASELINES  # not above: other commands need no simulator
+    from springfoot.agents.policies.policy import SHIPPED
+
+    specification = ast.literal_eval(line[1])
+    for command, names in {
+        "evaluate": (*SHIPPED, *BASELINES),
+        "live": (*SHIPPED, *BASELINES),
+        "export": SHIPPED,
+    }.items():
+        # Words are offered as the flags of an option are.
+        policies = {"flags": list(names), "description": "policy", "type": "flag"}
+        specification["subcommands"][command]["options"].append(policies)
+    _join_lines(specification)
+    return f"COMPLETION_SPEC = {specification!r}"
+
+
+def _join_lines(command: dict[str, Any]) -> None:
+    """Put the descriptions of a command's options, and those of the commands below it, on one line each."""
+    for option in command["options"]:
+        option["description"] = " ".join(option["description"].split())
+    for subcommand in command.get("subcommands", {}).values():
+        _join_lines(subcommand)
 
 
 def _all_commands(studies: dict[str, Any]) -> Any:

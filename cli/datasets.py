@@ -35,6 +35,7 @@ def datasets_main(arguments: Sequence[str] | None = None, program: str = "spring
 
 def run_datasets(flags: DatasetsFlags) -> None:
     """Write the sets; print the number of episodes, steps and falls in each, and its mean return."""
+    from springfoot.compiling import tell_of_compiling
     from springfoot.evaluation.recording.minari_sets import set_id, write_sets  # not above: help needs no simulator
 
     require_count("episodes", flags.episodes, 1, MOST_EPISODES)
@@ -42,6 +43,7 @@ def run_datasets(flags: DatasetsFlags) -> None:
     if not flags.sets or len(set(flags.sets)) < len(flags.sets):
         raise SpringfootError("give --sets each set once, of expert, medium and random")
     end_in_order()
+    tell_of_compiling()
     summaries = write_sets(flags.sets, flags.episodes, flags.seed)
     rows = [
         [set_id(name), str(row["episodes"]), f"{row['steps']:,}", f"{row['return_mean']:.0f}", str(row["falls"])]

@@ -89,6 +89,7 @@ def run_evaluation(flags: EvaluateFlags, program: str, command: str = "") -> Non
     if flags.out is not None and is_taken(flags.out):
         raise SpringfootError(f"{flags.out} exists already; give --out a new folder")
     from springfoot.agents.policies.baselines import FROZEN, has_feedback
+    from springfoot.compiling import tell_of_compiling
     from springfoot.evaluation.numbers import metrics
     from springfoot.evaluation.page import (
         report_page,  # not above: Matplotlib takes a while, and bad flags need not wait for it
@@ -97,6 +98,7 @@ def run_evaluation(flags: EvaluateFlags, program: str, command: str = "") -> Non
     from springfoot.evaluation.report import film, gait_table, report
 
     end_in_order()
+    tell_of_compiling()
     settings = {"episode_seconds": flags.seconds} | given(flags.environment)
     if flags.film:
         film.require_film()
@@ -140,8 +142,7 @@ def run_evaluation(flags: EvaluateFlags, program: str, command: str = "") -> Non
     if flags.json:
         print(json.dumps({"folder": str(out), "metrics": [gait.metrics for _, gait in walks]}, ensure_ascii=False))
         return
-    for _, gait in walks:
-        gait_table.print_table(gait.metrics)
+    gait_table.print_tables([gait.metrics for _, gait in walks])
     for name in flags.policies:
         if has_feedback(name):
             open_loop = f"{program} {shlex.quote(f'{FROZEN}:{name}')}"

@@ -55,8 +55,10 @@ def run_live(flags: LiveFlags) -> None:
         require_number("seconds", flags.seconds, 0.0, unit="s", above=True)
     if sys.stderr.isatty():
         print("starting…", file=sys.stderr, flush=True)
+    from springfoot.compiling import tell_of_compiling
     from springfoot.evaluation.live.view import LiveView  # not above: bad flags need not wait for viser
 
+    tell_of_compiling()
     view = LiveView(LiveSession(flags.policy, given(flags.environment), flags.seed), flags.host, flags.port)
     print(f"Live at {view.address} (Ctrl-C ends it)", flush=True)
     try:

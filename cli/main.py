@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from springfoot import __version__
-from springfoot.extras import EXTRA_OF
+from springfoot.errors import perhaps
+from springfoot.extras import EXTRA_OF, missing
 from springfoot.terminal import at_terminal
 
 if TYPE_CHECKING:
@@ -25,7 +26,9 @@ FIRST = """To begin with:
 
 springfoot --help lists all commands."""
 """Commands that a newcomer types, in their order."""
-HELP = f"""usage: springfoot {{train,evaluate,live,export,study,datasets,examples,completion}} ...
+COMMANDS = ("train", "evaluate", "live", "export", "study", "datasets", "examples", "completion")
+"""Names of all commands."""
+HELP = f"""usage: springfoot {{{",".join(COMMANDS)}}} ...
 
   springfoot train --out FOLDER     train a policy that sets the stiffness of ankles and toes
   springfoot evaluate POLICY        how human is its walk? numbers, curves, pictures; POLICY may be pretrained
@@ -34,7 +37,7 @@ HELP = f"""usage: springfoot {{train,evaluate,live,export,study,datasets,example
   springfoot study NAME             hold many walks against each other; springfoot study --help lists them
   springfoot datasets               write Minari sets of walks, for offline learning
   springfoot examples --copy FOLDER copy the programs to start from, for springfoot and other learners
-  springfoot completion SHELL       print the tab completion of all flags for bash, zsh or tcsh
+  springfoot completion SHELL       print the tab completion of commands, policies and flags for bash or zsh
 
 Each takes --help; springfoot --version says which this is.
 Pages that help names, docs/..., lie in {Path(__file__).parents[1]}."""
@@ -129,13 +132,10 @@ def _run(words: list[str]) -> int:
     except ModuleNotFoundError as error:
         if error.name not in EXTRA_OF:
             raise
-        extra = "train" if words[0] == "train" else EXTRA_OF[error.name]  # `train` needs all of its extra
-        print(
-            f"springfoot {words[0]}: error: the package {error.name} is missing: pip install 'springfoot[{extra}]'",
-            file=sys.stderr,
-        )
+        extra = "train" if words[0] == "train" else ""  # `train` needs all of its extra
+        print(f"springfoot {words[0]}: error: {missing(error.name, extra)}", file=sys.stderr)
         return 2
-    known = "there are train, evaluate, live, export, study, datasets, examples and completion"
+    known = f"there are {', '.join(COMMANDS)}{perhaps(words[0], COMMANDS)}"
     print(f"springfoot: error: no command {words[0]!r:.60}; {known}", file=sys.stderr)
     return 2
 
@@ -150,7 +150,8 @@ def study_main(arguments: Sequence[str]) -> int:
         print(study_help())
         return 0
     if name not in STUDIES:
-        print(f"springfoot study: error: no study {name!r:.60}; there are {', '.join(STUDIES)}", file=sys.stderr)
+        known = f"there are {', '.join(STUDIES)}{perhaps(name, STUDIES)}"
+        print(f"springfoot study: error: no study {name!r:.60}; {known}", file=sys.stderr)
         return 2
     from springfoot.command_line import end_in_order, exit_code, parse
 
@@ -160,7 +161,10 @@ def study_main(arguments: Sequence[str]) -> int:
 
     def run() -> int:
         """Run the study, which signals end in good order; return the exit code."""
+        from springfoot.compiling import tell_of_compiling
+
         end_in_order()
+        tell_of_compiling()
         return study.run(name)
 
     return exit_code(program, run)

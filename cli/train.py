@@ -116,7 +116,7 @@ def run_training(flags: TrainFlags) -> int:
     best = record["best"]
     print(f"\n{record['timesteps']:,} steps in {record['seconds']:.0f} s, {record['status']}.")
     if best:
-        falls = f"{best['falls']} of {best['episodes']} episodes fell"
+        falls = f"{best['falls']} of {best['episodes']} episodes {_fell_under(record)}"
         print(f"Best:    return {best['return_mean']:.1f}, {falls}, after {best['timesteps']:,} steps")
         if not best["timesteps"]:
             print("         It is the policy that training began with: train longer, or try last.safetensors.")
@@ -156,7 +156,7 @@ def _resume(flags: TrainFlags, settings: dict[str, Any]) -> dict[str, Any]:
 
 def _engine(rllib: bool) -> Any:
     """Import and return the module that trains, with RLlib or stable-baselines3; from here on signals end the command
-    in good order.
+    in good order, and a compilation of kernels is told.
 
     Not imported above: torch takes seconds, and bad flags need not wait for it.
     """
@@ -165,7 +165,10 @@ def _engine(rllib: bool) -> Any:
             from springfoot.agents.training.cluster import rllib_training as module
     else:
         from springfoot.agents.training import training as module
+    from springfoot.compiling import tell_of_compiling
+
     end_in_order()
+    tell_of_compiling()
     return module
 
 
@@ -180,6 +183,7 @@ def run_seeds(config: TrainingConfig, out: Path, count: int) -> int:
     end_in_order()
     record = multi_seed.train_seeds(config, out, count)
     print(f"\n{multi_seed.training_table(record)}\n")
+    print(f"Falls:   episodes that {_fell_under(record)}")
     files = "best.safetensors, last.safetensors, run.json, TensorBoard"
     print(f"Results: {out} ({multi_seed.SEEDS}, and in each seed-N: {files})")
     print(f"Next:    springfoot study compare {_quoted(out)}/seed-* --no-springs")
@@ -193,6 +197,14 @@ def run_seeds(config: TrainingConfig, out: Path, count: int) -> int:
             return stopped_by(record)
         case _:  # one failed
             return 1
+
+
+def _fell_under(record: dict[str, Any]) -> str:
+    """Return in words under which pushes and in which time episodes of a training fell; `record` is its run.json or
+    seeds.json."""
+    environment = record["config"]["environment"]
+    pushes = f" under pushes of ±{environment['push_newton']:g} N" if environment["push_newton"] else ""
+    return f"fell{pushes} within {environment['episode_seconds']:g} s"
 
 
 def _for_folders(command: str, folders: Sequence[Path]) -> str:

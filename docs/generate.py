@@ -23,7 +23,7 @@ COMMANDS = [
     ("`springfoot export`", "write a policy as an ONNX file"),
     ("`springfoot datasets`", "write Minari sets of walks, for offline learning"),
     ("`springfoot examples`", "list or copy programs to start from"),
-    ("`springfoot completion`", "print the tab completion of all flags for a shell"),
+    ("`springfoot completion`", "print the tab completion of commands, policies and flags for bash or zsh"),
 ]
 
 

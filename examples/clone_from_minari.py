@@ -8,12 +8,16 @@ springfoot evaluate clone.safetensors
 import argparse
 from pathlib import Path
 
-import minari
 import numpy as np
-import torch
-from torch import nn
 
-from springfoot.agents import policy_from_mlp, save_policy
+from springfoot.extras import exiting_if_missing
+
+with exiting_if_missing():
+    import minari
+    import torch
+    from torch import nn
+
+    from springfoot.agents import policy_from_mlp, save_policy
 
 
 def main() -> None:
@@ -36,7 +40,6 @@ def main() -> None:
     variance[variance < 1e-6] = 1e12  # what never varies tells nothing
     inputs = torch.from_numpy(((observations - mean) / np.sqrt(variance)).clip(-10, 10).astype(np.float32))
     targets = torch.from_numpy(actions)
-
     network = nn.Sequential(nn.Linear(inputs.shape[1], 64), nn.Tanh(), nn.Linear(64, 64), nn.Tanh(), nn.Linear(64, 4))
     optimizer = torch.optim.Adam(network.parameters(), lr=1e-3)
     for _ in range(given.epochs):
@@ -47,12 +50,10 @@ def main() -> None:
             optimizer.step()
     error = nn.functional.mse_loss(network(inputs), targets).item()
     print(f"{len(inputs):,} steps, mean squared error of the action {error:.5f}")
-
     assert dataset.spec.env_spec is not None
-    settings = dataset.spec.env_spec.kwargs
     layers = [(layer.weight, layer.bias) for layer in network if isinstance(layer, nn.Linear)]
-    seen = {"observation_mean": mean, "observation_variance": variance, "observation_clip": 10.0}
-    save_policy(given.out, policy_from_mlp(layers, settings, activation="tanh", variance_floor=0.0, **seen))
+    seen = {"observation_mean": mean, "observation_variance": variance, "observation_clip": 10.0, "variance_floor": 0.0}
+    save_policy(given.out, policy_from_mlp(layers, dataset.spec.env_spec.kwargs, activation="tanh", **seen))
 
 
 if __name__ == "__main__":

@@ -7,10 +7,13 @@ Needs no torch: a policy file is read and run with NumPy.
 
 import argparse
 
-from matplotlib.figure import Figure
-
-from springfoot.evaluation import measure, policy_and_settings, record
+from springfoot.extras import exiting_if_missing
 from springfoot.gait import PERCENT
+
+with exiting_if_missing():
+    from matplotlib.figure import Figure
+
+    from springfoot.evaluation import measure, policy_and_settings, record
 
 ROWS = {
     "stiffness\nN·m/rad": ("ankle_stiffness_Nm_per_rad", "toe_stiffness_Nm_per_rad"),

@@ -7,10 +7,13 @@ this: with wandb it is `lambda evaluation: wandb.log(evaluation, step=evaluation
 import argparse
 from pathlib import Path
 
-import optuna  # pyright: ignore[reportMissingImports]
-
-from springfoot.agents import TrainingConfig, train
 from springfoot.envs import BipedSettings
+from springfoot.extras import exiting_if_missing
+
+with exiting_if_missing():
+    import optuna  # pyright: ignore[reportMissingImports]
+
+    from springfoot.agents import TrainingConfig, train
 
 
 def main() -> None:

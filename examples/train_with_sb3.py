@@ -7,11 +7,14 @@ springfoot evaluate mine.safetensors
 import argparse
 from pathlib import Path
 
-from stable_baselines3 import PPO
-from stable_baselines3.common.vec_env import VecNormalize
+from springfoot.extras import exiting_if_missing
 
-from springfoot.agents import SegmentedFootBipedVecEnv, policy_from_sb3, save_policy
-from springfoot.evaluation import policy_and_settings, record
+with exiting_if_missing():
+    from stable_baselines3 import PPO
+    from stable_baselines3.common.vec_env import VecNormalize
+
+    from springfoot.agents import SegmentedFootBipedVecEnv, policy_from_sb3, save_policy
+    from springfoot.evaluation import policy_and_settings, record
 
 
 def main() -> None:

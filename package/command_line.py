@@ -9,6 +9,7 @@ import threading
 from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import redirect_stderr
+from difflib import SequenceMatcher
 from typing import Any, TypeVar
 
 import tyro
@@ -61,7 +62,7 @@ def _repeated_flag(words: Sequence[str]) -> str:
 
 
 def _message_in_box(text: str) -> str:
-    """Return one line for the error that tyro has printed in a box: its first part, and the first suggested flag."""
+    """Return one line for the error that tyro has printed in a box: its first part, and the suggested flags."""
     lines = [line.strip("│ ") for line in text.splitlines() if not line.startswith(("╭", "╰"))]
     # Rules of dashes divide the box into its error and its suggestions.
     parts = re.split(r"\n[─-]{9,}\n", "\n".join(lines))
@@ -72,8 +73,18 @@ def _message_in_box(text: str) -> str:
         message = re.sub(pattern, wording, message)
     # As the rest of a line: a small first letter, no full stop; an ellipsis stays.
     message = message[:1].lower() + re.sub(r"(?<!\.)\.$", "", message[1:])
-    suggestion = re.search(r"Perhaps you meant: (--\S+)", " ".join(" ".join(parts[1:]).split()))
-    return f"{message}; perhaps {suggestion[1]}?" if suggestion else message
+    _, _, similar = text.partition("Perhaps you meant:")
+    suggested = _nearest(message, re.findall(r"^[│ ] {5}(--\S+)", similar, re.MULTILINE))
+    return f"{message}; perhaps {suggested}?" if suggested else message
+
+
+def _nearest(message: str, flags: Sequence[str]) -> str:
+    """Return in words those three of tyro's suggested `flags` that are most similar to the flag in the `message`, the
+    nearest first; tyro lists flags that contain it by the alphabet. "" without flags."""
+    wrong = next((word for word in message.split() if word.startswith("--")), "").rstrip(",")
+    ordered = sorted(dict.fromkeys(flags), key=lambda flag: -SequenceMatcher(None, wrong, flag).ratio())
+    *others, last = ordered[:3] or [""]
+    return f"{', '.join(others)} or {last}" if others else last
 
 
 def exit_code(name: str, work: Callable[[], int | None]) -> int:

@@ -1,5 +1,7 @@
 """Define the one exception of springfoot, and the checks that most often raise it."""
 
+from collections.abc import Iterable
+from difflib import get_close_matches
 from math import inf, isfinite, isinf, isnan, nan
 from numbers import Integral, Real
 
@@ -28,6 +30,13 @@ def quoted(value: object, most: int = 60) -> str:
     except ValueError:  # a whole number of thousands of digits
         text = f"{type(value).__name__} too long to print"
     return text if len(text) <= most else f"{text[: most - 3]}..."
+
+
+def perhaps(word: str, known: Iterable[str]) -> str:
+    """Return the end of a message on an unknown `word`, "; perhaps NAME?" with the most similar of the `known` names;
+    "" if none is similar."""
+    similar = get_close_matches(word, known, n=1)
+    return f"; perhaps {similar[0]}?" if similar else ""
 
 
 def as_float(value: object) -> float:

@@ -1,7 +1,9 @@
 """Name the extra of springfoot that installs a missing package."""
 
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 EXTRA_OF = {
     "PIL": "evaluate",
@@ -39,5 +41,25 @@ def naming_extras() -> Iterator[None]:
     except ModuleNotFoundError as error:
         if error.name not in EXTRA_OF:
             raise
-        advice = f"the package {error.name} is missing: pip install 'springfoot[{EXTRA_OF[error.name]}]'"
-        raise ModuleNotFoundError(advice, name=error.name) from None
+        raise ModuleNotFoundError(missing(error.name), name=error.name) from None
+
+
+@contextmanager
+def exiting_if_missing() -> Iterator[None]:
+    """End a program, with one line on standard error and exit code 2, if a package that it imports inside the block is
+    missing."""
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        package = (error.name or "").partition(".")[0]
+        if package in ("", "springfoot"):
+            raise
+        print(f"{Path(sys.argv[0]).name}: error: {missing(package)}", file=sys.stderr)
+        sys.exit(2)
+
+
+def missing(package: str, extra: str = "") -> str:
+    """Return the message on a missing package, with the command that installs it: `extra` or else its own extra of
+    springfoot, and the package itself if it is in none."""
+    extra = extra or EXTRA_OF.get(package, "")
+    return f"the package {package} is missing: pip install " + (f"'springfoot[{extra}]'" if extra else package)

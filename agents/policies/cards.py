@@ -3,7 +3,7 @@
 from hashlib import sha256
 
 from springfoot.envs.settings.settings import BipedSettings, settings_to_json
-from springfoot.errors import SpringfootError
+from springfoot.errors import SpringfootError, perhaps
 from springfoot.files.text_table import read_bytes
 
 from .policy import PRETRAINED_BY, SHIPPED, find_policy, read_policy
@@ -28,7 +28,9 @@ SHARED_LIMITS = (
 def policy_card(name: str) -> str:
     """Return the model card of one of `SHIPPED`, as Markdown; raise `SpringfootError` for another name."""
     if name not in SHIPPED:
-        raise SpringfootError(f"no policy {name!r} in the package; there are {', '.join(SHIPPED)}")
+        raise SpringfootError(
+            f"no policy {name!r} in the package; there are {', '.join(SHIPPED)}{perhaps(name, SHIPPED)}"
+        )
     policy = read_policy(name)
     purpose, command, page = MADE.get(name) or _of_a_foot(name)
     defaults = settings_to_json(BipedSettings())

@@ -15,7 +15,7 @@ import numpy as np
 from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.settings.settings import BipedSettings, settings_from, settings_to_json
 from springfoot.envs.task.mirror import Mirror, mirror_of
-from springfoot.errors import SpringfootError, quoted
+from springfoot.errors import SpringfootError, perhaps, quoted
 from springfoot.files.tensor_file import read_tensors, write_tensors
 
 from .fingerprint import fingerprint, require_same
@@ -176,6 +176,7 @@ def find_policy(name: str | Path) -> Path:
     elif not path.is_file():
         raise SpringfootError(
             f"no policy {name}: give a .safetensors or .onnx file, a run folder, module:function or 'pretrained'"
+            f"{perhaps(str(name), SHIPPED)}"
         )
     return path
 

@@ -260,8 +260,11 @@ def _main() -> int:
 
 def _train(config: TrainingConfig, folder: str) -> int:
     """Train or continue one seed in this process; return the exit code."""
+    from springfoot.compiling import tell_of_compiling
+
     from .training import resume, train  # not above: torch takes seconds, and the parent process does not need it
 
+    tell_of_compiling()
     _block(False)  # a signal that came during the imports is delivered here, where `exit_code` catches it
     end_in_order()
     record = resume(folder, threads=config.threads) if (Path(folder) / RUN).is_file() else train(config, folder)

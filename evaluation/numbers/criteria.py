@@ -98,13 +98,14 @@ def with_derived(metrics: dict[str, Any]) -> dict[str, Any]:
 
 
 def unmet(metrics: dict[str, Any], criteria: Sequence[Criterion]) -> list[str]:
-    """Return those of `criteria` that an evaluation misses, each as its name and number; empty if it meets all.
+    """Return those of `criteria` that an evaluation misses, each as its name, number and allowed range; empty if it
+    meets all.
 
     `metrics` is the content of metrics.json.
     """
     values = with_derived(metrics)
     return [
-        f"{criterion.name} {number_text(criterion, values)}" for criterion in criteria if not criterion.holds(values)
+        f"{criterion.name} {missed_text(criterion, values)}" for criterion in criteria if not criterion.holds(values)
     ]
 
 
@@ -112,6 +113,11 @@ def number_text(criterion: Criterion, values: dict[str, Any]) -> str:
     """Return the criterion's number with its unit as text, "?" if it could not be measured."""
     value = criterion.value(values)
     return "?" if value is None else format(value, criterion.pattern) + criterion.unit
+
+
+def missed_text(criterion: Criterion, values: dict[str, Any]) -> str:
+    """Return the criterion's number and its allowed range as text: `2.59°, asked ≤ 2.50°`."""
+    return f"{number_text(criterion, values)}, asked {criterion.text}"
 
 
 _FORCES = {

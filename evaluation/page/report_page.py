@@ -19,7 +19,7 @@ from ..numbers.criteria import (
     WORKS_LIKE_PEOPLE,
     Criterion,
     fault,
-    number_text,
+    missed_text,
     with_derived,
 )
 from ..numbers.metrics import Gait
@@ -131,13 +131,13 @@ def _judged(metrics: Mapping[str, Any], criteria: Sequence[Criterion], judged: b
         return f"No verdict: the criteria are for {JUDGED_SPEED:g} m/s and people."
     values = with_derived(dict(metrics))
     missed = [
-        f"{criterion.label or criterion.name}: {number_text(criterion, values)}"
+        f"{criterion.label or criterion.name} {missed_text(criterion, values)}"
         for criterion in criteria
         if not criterion.holds(values)
     ]
     if not missed:
         return f"Meets all {len(criteria)} criteria of a human-like walk."
-    return f"Misses {len(missed)} of {len(criteria)} criteria ({'; '.join(missed)})."
+    return f"Misses {len(missed)} of {len(criteria)} criteria: {'; '.join(missed)}."
 
 
 def _text(value: float | None, pattern: str) -> str:

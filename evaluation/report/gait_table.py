@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from rich import box
@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from springfoot.envs.physics.model import LEFT, RIGHT
 from springfoot.envs.settings.settings import BipedSettings, body_of, reference_gait, settings_from
 from springfoot.errors import printable
 from springfoot.files.markdown import plus_minus, text_of
@@ -19,6 +20,7 @@ from springfoot.gait.people.gait_events import PERCENT
 from springfoot.gait.plan.effort import effort_of_people
 
 from ..numbers.criteria import fault
+from ..recording.open_loop import deciding_legs
 
 
 def print_table(metrics: dict[str, Any], console: Console | None = None) -> None:
@@ -26,64 +28,183 @@ def print_table(metrics: dict[str, Any], console: Console | None = None) -> None
 
     `metrics` is the content of metrics.json, `console` the place to print, standard output unless given.
     """
+    print_tables([metrics], console)
+
+
+def print_tables(walks: Sequence[dict[str, Any]], console: Console | None = None) -> None:
+    """Print evaluations as one table with a column for each, people beside them, and a legend.
+
+    In a terminal too narrow for it, and for walks beside different people, each has a table of its own. `walks` are the
+    contents of metrics.json, `console` is the place to print, standard output unless given.
+    """
     console = console or Console(highlight=False)
+    together = _table_of_several(walks) if len(walks) > 1 and _beside_the_same_people(walks) else None
+    one_table = together is not None and _fits(together, console)
+    if one_table:
+        _print_head(walks, console)
+        console.print(together)
+        console.print()
+        for metrics in walks:
+            _print_notes(metrics, console, f"{metrics['policy']}: ")
+    else:
+        for metrics in walks:
+            _print_head([metrics], console)
+            console.print(_table_of_one(metrics, console.width < NARROW))
+            _print_notes(metrics, console)
+    for line in _legend(walks, with_likeness=not one_table):
+        _print_line(line, console)
+
+
+def _fits(table: Table, console: Console) -> bool:
+    """Return True if a table can be printed uncut; a console that is no terminal is made as wide as it."""
+    columns = console.measure(table, options=console.options.update(width=ANY_WIDTH)).maximum
+    if not console.is_terminal:
+        console.width = max(console.width, columns)
+    return columns <= console.width
+
+
+def _print_line(text: str, console: Console, style: str = "") -> None:
+    """Print a text: wrapped between words in a terminal, elsewhere on one line."""
+    console.print(escape(text), style=style or None, soft_wrap=not console.is_terminal)
+
+
+def _print_head(walks: Sequence[dict[str, Any]], console: Console) -> None:
+    """Print a line with the names of the policies, body, speed, rest angles, pushes and feet; one for each of these
+    worlds."""
+    names_in = dict[str, list[str]]()
+    for metrics in walks:
+        names_in.setdefault(_world(metrics), []).append(metrics["policy"])
+    console.print()
+    for world, names in names_in.items():
+        console.print(f"[bold]{escape(', '.join(names))}[/] on {escape(world)}", soft_wrap=not console.is_terminal)
+
+
+def _world(metrics: dict[str, Any]) -> str:
+    """Return in words the body, speed, rest angles and pushes of an evaluation, and on a line below feet that
+    differ."""
     environment = metrics["environment"]
-    people = metrics["reference"]
     pushes = f", pushes ±{environment['push_newton']:g} N" if environment["push_newton"] else ""
-    console.print(
-        f"\n[bold]{escape(metrics['policy'])}[/] on {environment['height']:g} m, {environment['mass']:g} kg, "
-        f"{environment['speed']:g} m/s, equilibrium {environment['equilibrium']}{pushes}",
-        soft_wrap=not console.is_terminal,
-    )
+    feet = ", ".join(f"{side} {kind}" for side, kind in metrics["feet"].items())
+    return (
+        f"{environment['height']:g} m, {environment['mass']:g} kg, {environment['speed']:g} m/s, "
+        f"springs' rest angles {environment['equilibrium']}{pushes}"
+    ) + ("" if metrics["per_leg"] is None else f"\nfeet: {feet}")
+
+
+def _print_notes(metrics: dict[str, Any], console: Console, of_policy: str = "") -> None:
+    """Print below the table of an evaluation the table of its legs, its fault, its falls and its own people, where
+    there are any; each note begins with the words `of_policy`."""
     if metrics["per_leg"] is not None:
-        console.print("feet: " + ", ".join(f"{side} {kind}" for side, kind in metrics["feet"].items()))
-    reference = "people" if environment["human"] is None else "own"
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1))
-    narrow = console.width < NARROW
-    label_columns = ("",) if narrow else ("", "")  # quantity and unit, or both in one column
-    for name in (*label_columns, "model", reference, "r", "in ±SD"):
-        table.add_column(
-            name,
-            justify="right" if name else "left",
-            style="bold" if name == "model" else "",
-            no_wrap=bool(name) or not narrow,
-        )
-    for section in _sections(metrics):
-        for label, unit, *values in section:
-            label_with_unit = f"{label}, {unit}" if unit else label
-            labels = [label_with_unit] if narrow else [label, unit]
-            table.add_row(*labels, *values)
-        table.add_section()
-    console.print(table)
-    if metrics["per_leg"] is not None:
-        console.print(_leg_table(metrics, narrow))
+        console.print(_leg_table(metrics, console.width < NARROW, f"{of_policy}each leg"))
     if warning := fault(metrics):
-        console.print(f"[bold red]{escape(warning)}[/]", soft_wrap=not console.is_terminal)
+        _print_line(of_policy + warning, console, "bold red")
     for reason, count in metrics["fall_reasons"].items():
-        console.print(f"{count} × {reason}")
-    if environment["human"] is not None:
+        _print_line(f"{of_policy}{count} × {reason}", console)
+    if metrics["environment"]["human"] is not None:
+        people = metrics["reference"]
         borrowed = ", ".join(people["borrowed"]) or "nothing"
-        console.print(f"own: {people['condition']}; people's instead: {borrowed}", soft_wrap=not console.is_terminal)
-    console.print(
-        f"{reference} at {people['speed_m_s']:.2f} m/s; r and share of the stride inside their mean ± SD: of mean "
-        "curves, the CoM's against the plan; stiffness: loading / mid-stance / push-off / swing; "
-        "feedback: share of its variance that the phase does not explain / its SD at equal phase",
-        soft_wrap=not console.is_terminal,
-    )
+        _print_line(f"{of_policy}own: {people['condition']}; people's instead: {borrowed}", console)
 
 
-def _leg_table(metrics: dict[str, Any], narrow: bool) -> Table:
+def _people_word(metrics: dict[str, Any]) -> str:
+    """Return the heading of the people compared with: `people`, or `own` for own data."""
+    return "people" if metrics["environment"]["human"] is None else "own"
+
+
+def _beside_the_same_people(walks: Sequence[dict[str, Any]]) -> bool:
+    """Return True if all evaluations are compared with the same numbers of people."""
+    people = [(_people_word(metrics), people_metrics(settings_from(**metrics["environment"]))) for metrics in walks]
+    return all(numbers == people[0] for numbers in people)
+
+
+def _legend(walks: Sequence[dict[str, Any]], with_likeness: bool) -> list[str]:
+    """Return lines that explain the words of the tables of some evaluations.
+
+    Tables `with_likeness` have the columns r and in ±SD.
+    """
+    first, *_ = walks
+    feet_differ = any(metrics["per_leg"] is not None for metrics in walks)
+    return [
+        f"{_people_word(first)}: mean curves at {first['reference']['speed_m_s']:.2f} m/s; "
+        "±: SD between episodes; return: sum of rewards",
+        "RMSE: root mean square difference from people's mean curve (CoM, CoP: the plan)",
+        *(LIKENESS if with_likeness else LIKENESS_ELSEWHERE),
+        *(BOTH_LEGS if feet_differ else ()),
+        *WORDS,
+    ]
+
+
+LIKENESS = (
+    "r: correlation with people's mean curve (CoM, CoP: with the plan's)",
+    "in ±SD: share of the stride with the mean curve inside people's mean ± SD",
+)
+"""Lines of the legend for the columns r and in ±SD."""
+LIKENESS_ELSEWHERE = ("correlation, and share of the stride inside people's mean ± SD: metrics.json",)
+"""Line of the legend in place of `LIKENESS`, where a table lacks these columns."""
+BOTH_LEGS = ("both legs: means of the two; feedback: of legs whose stiffness the policy sets",)
+"""Line of the legend for a walk whose feet differ."""
+WORDS = (
+    "BW: body weights; J/kg: of one leg in a stride (energy: of both; CoM: in a step)",
+    "cost of transport: positive work of joints / (weight · distance), no unit",
+    "effort: fibre work / (weight · distance) + activation, its rate, accelerations",
+    "CoM: centre of mass; CoP: centre of pressure; ZMP: where the plan has the CoP",
+    "stiffness: loading / mid-stance / push-off / swing",
+    "rest angles: where the springs of ankles and toes are slack (--equilibrium)",
+    "feedback: share of stiffness's variance not due to the phase / SD at equal phase",
+)
+"""Lines of the legend for every evaluation."""
+
+
+def _table_of_one(metrics: dict[str, Any], narrow: bool) -> Table:
+    """Return the table of one evaluation, with likeness to people; in a `narrow` terminal the unit goes into the label.
+
+    `metrics` is the content of metrics.json.
+    """
+    what = "" if metrics["per_leg"] is None else "both legs"
+    table = _empty_table((what,) if narrow else (what, ""), narrow)
+    for name in ("model", _people_word(metrics), "r", "in ±SD"):
+        table.add_column(name, justify="right", style="bold" if name == "model" else "", no_wrap=True)
+    for section in _sections(metrics):
+        for row in section:
+            labels = [f"{row.label}, {row.unit}" if row.unit else row.label] if narrow else [row.label, row.unit]
+            table.add_row(*labels, row.model, row.people, row.r, row.inside)
+        table.add_section()
+    return table
+
+
+def _table_of_several(walks: Sequence[dict[str, Any]]) -> Table:
+    """Return the table of several evaluations beside the same people; a row that one lacks is empty there."""
+    table = _empty_table(("", ""))
+    table.show_edge = False  # so that two policies fit into 80 columns
+    for name in (*(metrics["policy"] for metrics in walks), _people_word(walks[0])):
+        table.add_column(escape(name), justify="right", no_wrap=True)
+    for sections in zip(*map(_sections, walks), strict=True):  # the same section of each walk
+        rows_of = [{(row.label, row.unit): row for row in section} for section in sections]
+        for key in dict.fromkeys(key for rows in rows_of for key in rows):
+            people = next(rows[key].people for rows in rows_of if key in rows)
+            table.add_row(*key, *(rows[key].model if key in rows else "" for rows in rows_of), people)
+        table.add_section()
+    return table
+
+
+def _empty_table(label_columns: Sequence[str], narrow: bool = False) -> Table:
+    """Return a table with columns for the labels of its rows, which take two lines if it is `narrow`."""
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1))
+    for name in label_columns:
+        table.add_column(name, no_wrap=not narrow)
+    return table
+
+
+def _leg_table(metrics: dict[str, Any], narrow: bool, heading: str) -> Table:
     """Return the table of the two legs, for feet that differ; a foot's name may take two lines.
 
-    `metrics` is the content of metrics.json; in a `narrow` terminal the unit goes into the label.
+    `metrics` is the content of metrics.json; in a `narrow` terminal the unit goes into the label, below the `heading`.
     """
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1))
-    for name in ("each leg",) if narrow else ("each leg", ""):
-        table.add_column(name, no_wrap=not narrow)
+    table = _empty_table((heading,) if narrow else (heading, ""), narrow)
     for side, kind in metrics["feet"].items():
         table.add_column(f"{side}: {kind}", justify="right", min_width=len("-0.00"))
     for label, unit, *values in leg_rows(metrics):
-        table.add_row(*([f"{label}, {unit}"] if narrow else [label, unit]), *values)
+        table.add_row(*([f"{label}, {unit}" if unit else label] if narrow else [label, unit]), *values)
     return table
 
 
@@ -115,7 +236,13 @@ def leg_rows(metrics: dict[str, Any]) -> list[tuple[str, str, str, str]]:
     for joint in ("hip", "knee", "ankle", "toe"):
         work = (leg["joint_work_J_kg"][joint]["positive"] for leg in legs)
         rows.append(row(f"{joint} work, positive", "J/kg", work, ".2f"))
-    return rows
+    for joint in ("ankle", "toe"):
+        for part in ("loading", "mid_stance", "push_off", "swing"):
+            stiffness = (leg["stiffness_Nm_rad"][joint][part] for leg in legs)
+            rows.append(row(f"{joint} stiffness, {part.replace('_', '-')}", "N·m/rad", stiffness, ".0f"))
+    deciding = deciding_legs(settings_from(**metrics["environment"]))
+    left, right = ("policy" if side in deciding else "device" for side in (LEFT, RIGHT))
+    return [*rows, ("stiffness is set by", "", left, right)]
 
 
 def table_rows(metrics: dict[str, Any]) -> list["TableRow"]:
@@ -136,10 +263,20 @@ def print_words(text: str) -> None:
     console.print(printable(text), soft_wrap=not console.is_terminal)
 
 
-NARROW = 76
-"""Columns of a terminal below which the unit goes into the label, which may take two lines; numbers never do."""
-TableRow = tuple[str, str, str, str, str, str]
-"""Quantity, unit, model, people, r, fraction inside people's mean ± SD."""
+NARROW, ANY_WIDTH = 76, 10_000
+"""Columns of a terminal below which the unit goes into the label, which may take two lines; numbers never do. More
+columns than any table takes."""
+
+
+class TableRow(NamedTuple):
+    """Texts of a row: quantity, unit, model's and people's number, r, percent inside people's mean ± SD."""
+
+    label: str
+    unit: str
+    model: str
+    people: str = ""
+    r: str = ""
+    inside: str = ""
 
 
 def _sections(metrics: dict[str, Any]) -> list[list[TableRow]]:
@@ -156,7 +293,7 @@ def _sections(metrics: dict[str, Any]) -> list[list[TableRow]]:
     com = metrics["com"]
     zmp = metrics["zmp"]
     rest = metrics["came_to_rest"]
-    at_rest = [] if rest is None else [("came to rest", "", f"{rest} of {metrics['episodes']}", "", "", "")]
+    at_rest = [] if rest is None else [TableRow("came to rest", "", f"{rest} of {metrics['episodes']}")]
 
     def row(
         label: str, unit: str, value: Any, pattern: str, of_people: Any = None, r: Any = None, inside: Any = None
@@ -165,7 +302,7 @@ def _sections(metrics: dict[str, Any]) -> list[list[TableRow]]:
         people's SD; None leaves a cell empty."""
         text = plus_minus(value, pattern) if isinstance(value, dict) else text_of(value, pattern)
         inside_text = "" if inside is None else f"{inside:.0f} %"
-        return (
+        return TableRow(
             label,
             unit,
             text,
@@ -184,14 +321,14 @@ def _sections(metrics: dict[str, Any]) -> list[list[TableRow]]:
 
     return [
         [
-            ("falls", "", f"{metrics['falls']} of {metrics['episodes']}", "", "", ""),
+            TableRow("falls", "", f"{metrics['falls']} of {metrics['episodes']}"),
             *at_rest,
-            row("return", "", metrics["return"], ".1f"),
+            row("return", "", metrics["return"], ".0f"),
             row("speed", "m/s", metrics["speed_m_s"], ".3f", people["speed_m_s"]),
             row("step length", "m", metrics["step_length_m"], ".3f", people["step_length_m"]),
             row("cadence", "steps/min", metrics["cadence_steps_min"], ".1f", people["cadence_steps_min"]),
             row("double support", "s", metrics["double_support_s"], ".3f", people["double_support_s"]),
-            row("toe-off", "%", metrics["toe_off_percent"], ".1f", people["toe_off_percent"]),
+            row("toe-off", "% stride", metrics["toe_off_percent"], ".1f", people["toe_off_percent"]),
         ],
         [
             row(f"{name} angle, RMSE", "deg", v["rmse_deg"], ".1f", None, v["r"], v["within_1sd_percent"])
@@ -216,10 +353,10 @@ def _sections(metrics: dict[str, Any]) -> list[list[TableRow]]:
         ]
         + [
             row("cost of transport", "", metrics["cost_of_transport"], ".3f"),
-            row("fibre work", "J/kg/m", metrics["effort"]["fibre_J_kg_m"], ".2f", people["fibre_J_kg_m"]),
+            row("work of muscle fibres", "J/kg/m", metrics["effort"]["fibre_J_kg_m"], ".2f", people["fibre_J_kg_m"]),
             row("effort", "", metrics["effort"]["total"], ".2f", people["effort"]),
-            row("push-off on the CoM", "J/kg", metrics["com_work_J_kg"]["push_off"], ".2f"),
-            row("collision of the CoM", "J/kg", metrics["com_work_J_kg"]["collision"], ".2f"),
+            row("push-off, on the CoM", "J/kg", metrics["com_work_J_kg"]["push_off"], ".2f"),
+            row("collision, on the CoM", "J/kg", metrics["com_work_J_kg"]["collision"], ".2f"),
         ],
         [
             row(f"energy, {name.replace('_', ' ')}", "J/kg", metrics["energy_J_kg"][name], "+.3f")
@@ -230,16 +367,16 @@ def _sections(metrics: dict[str, Any]) -> list[list[TableRow]]:
             mm("CoM z to plan, RMSE", com["z_rmse_m"], com["z_r"]),
             mm("CoM rise", com["rise_m"]),
             mm("CoP to ZMP, RMSE", zmp["cop_rmse_m"], zmp["r"]),
-            mm("in single support", zmp["cop_rmse_single_support_m"]),
+            mm("CoP to ZMP, on one foot", zmp["cop_rmse_single_support_m"]),
             mm("toe clearance", metrics["toe_clearance_m"]),
-            mm("contact travel a stance", metrics["contact_travel_m"]),
+            mm("sole's slide a stance", metrics["contact_travel_m"]),
         ],
         [
-            (f"{name} stiffness", "N·m/rad", "/".join(text_of(v, ".0f") for v in values.values()), "", "", "")
+            TableRow(f"{name} stiffness", "N·m/rad", "/".join(text_of(v, ".0f") for v in values.values()))
             for name, values in metrics["stiffness_Nm_rad"].items()
         ]
         + [
-            (f"{name} feedback", "%", "/".join(percent(values[key]) for key in ("share", "spread")), "", "", "")
+            TableRow(f"{name} feedback", "%", "/".join(percent(values[key]) for key in ("share", "spread")))
             for name, values in metrics["feedback"].items()
         ],
     ]

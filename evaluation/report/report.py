@@ -29,7 +29,10 @@ from .schedule_tables import write_schedules
 FILES = (
     "metrics.json",
     "gait_cycle.csv",
+    "gait_cycle_left.csv",
+    "gait_cycle_right.csv",
     "every_stride.csv",
+    "every_stride.parquet",
     "strides.npz",
     "gait.png",
     "walk.gif",
@@ -41,7 +44,7 @@ FILES = (
     "walk.sto",
     "model.xml",
 )
-"""Files of an evaluation, of which it has one or two tables of finite states or none; and `gait_cycle` of each leg."""
+"""Files of an evaluation, which has one or two tables of finite states, or none, and Parquet only with pyarrow."""
 
 
 def write_report(

@@ -5,7 +5,7 @@ import json
 
 import pytest
 
-from springfoot.cli.main import main
+from springfoot.cli.main import COMMANDS, STUDIES, main
 from springfoot.cli.train import TrainFlags
 from springfoot.command_line import parse
 from springfoot.studies.base.flags import given
@@ -13,6 +13,8 @@ from springfoot.studies.base.flags import given
 # fmt: off
 EVALUATE = [
     (["--heigth", "1"], "unrecognized options: --heigth, 1; perhaps --height?"),
+    (["--push", "100"], "unrecognized options: --push, 100; perhaps --push-newton, --push-seconds or --push-interval?"),
+    (["--delay", "0.02"], "unrecognized options: --delay, 0.02; perhaps --stiffness-delay-s or --stiffness-delay-range-s?"),
     (["--height", "None"], "--height must be a number, got 'None'"),
     (["--height", "tall"], "--height must be a number, got 'tall'"),
     (["--height"], "--height needs a value"),
@@ -53,9 +55,21 @@ TRAIN = [
     (["--learning-rate", "fast"], "--learning-rate must be a number, got 'fast'"),
     (["--out"], "--out needs a value"),
 ]
+POLICIES = (
+    "give a .safetensors or .onnx file, a run folder, a schedule in a .csv or .json file, module:function, frozen:POLICY, "
+    "or one of pretrained, medium, predicted, passive-1-0 to adaptive-2-4, untrained, random, constant, schedule, "
+    "quasi_stiffness, thesis, thesis_printed"
+)
 CASES = [
     *((["evaluate", "schedule", *words], f"springfoot evaluate: error: {said}") for words, said in EVALUATE),
     *((["train", "--out", "x", *words], f"springfoot train: error: {said}") for words, said in TRAIN),
+    (["evaluat", "schedule"], f"springfoot: error: no command 'evaluat'; there are {', '.join(COMMANDS)}; perhaps evaluate?"),
+    (["zzz"], f"springfoot: error: no command 'zzz'; there are {', '.join(COMMANDS)}"),
+    (["study", "comapre"], f"springfoot study: error: no study 'comapre'; there are {', '.join(STUDIES)}; perhaps compare?"),
+    (["evaluate", "pretraind"], f"springfoot evaluate: error: no policy 'pretraind': {POLICIES}; perhaps pretrained?"),
+    (["live", "schedul:1.2"], f"springfoot live: error: no policy 'schedul:1.2': {POLICIES}; perhaps schedule?"),
+    (["evaluate", "zzz"], f"springfoot evaluate: error: no policy 'zzz': {POLICIES}"),
+    (["export", "predictd", "--out", "new.onnx"], "springfoot export: error: no policy predictd: give a .safetensors or .onnx file, a run folder, module:function or 'pretrained'; perhaps predicted?"),
     (["study", "compare", "schedule", "--epochs", "3"], "springfoot study compare: error: unrecognized options: --epochs, 3"),
 ]
 # fmt: on

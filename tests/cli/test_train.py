@@ -153,6 +153,7 @@ def test_it_ends_with_where_the_results_lie_and_what_to_type_next(monkeypatch, c
     out, progress = capsys.readouterr()
     assert "0 of 1,024 steps · return " in progress and "1,024 of 1,024 steps · return " in progress
     assert f"Results: {tmp_path / 'run'} (best.safetensors" in out
+    assert re.search(r"Best: .* of 2 episodes fell under pushes of ±150 N within 1 s, after", out)
     assert f"springfoot evaluate {tmp_path / 'run'}" in out
     assert read_policy(tmp_path / "run").settings.reward_weights == {"grf": 0.1}
 

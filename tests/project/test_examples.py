@@ -89,6 +89,26 @@ def test_examples_are_copied_out_of_the_package_into_a_new_folder(tmp_path, caps
     assert capsys.readouterr().err == error
 
 
+MISSING = {
+    "clone_from_minari.py": ("minari", "'springfoot[minari]'"),
+    "plot_schedule.py": ("matplotlib", "'springfoot[evaluate]'"),
+    "search_with_optuna.py": ("optuna", "optuna"),
+    "train_with_sb3.py": ("stable_baselines3", "'springfoot[train]'"),
+}
+"""Example -> a package that it needs, and the argument of `pip install` that brings it."""
+
+
+@pytest.mark.parametrize("name", MISSING)
+def test_an_example_without_its_package_says_in_one_line_what_to_install(name, tmp_path):
+    package, installed_by = MISSING[name]
+    # Python takes a module that is None in `sys.modules` for one that is not there.
+    without = f"import runpy, sys; sys.modules[{package!r}] = None; sys.argv = sys.argv[1:]; "
+    command = [sys.executable, "-c", f"{without}runpy.run_path(sys.argv[0], run_name='__main__')", str(EXAMPLES / name)]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 2
+    assert done.stderr == f"{name}: error: the package {package} is missing: pip install {installed_by}\n"
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", RUNS)
 def test_example_does_what_it_says(name, tmp_path, monkeypatch):

@@ -32,14 +32,14 @@ def test_limits_hold_to_their_very_value():
 @pytest.mark.parametrize(
     ("path", "value", "said"),
     [
-        (("falls",), 1, "falls 1"),
-        (("energy_J_kg", "contact"), 0.0004, "contact work 0.0004 J/kg"),
-        (("speed_m_s", "mean"), 1.231, "speed off by 0.031 m/s"),
-        (("speed_m_s", "mean"), None, "speed off by ?"),
-        (("joints", "knee", "rmse_deg"), 4.51, "knee 4.51°"),
-        (("joints", "ankle", "rmse_deg"), None, "ankle ?"),
-        (("grf", "vertical_peak2_bw"), 1.31, "vertical_peak2_bw 1.31 BW"),
-        (("grf", "vertical_r"), 0.92, "vertical_r 0.920"),
+        (("falls",), 1, "falls 1, asked ≤ 0"),
+        (("energy_J_kg", "contact"), 0.0004, "contact work 0.0004 J/kg, asked ≤ 0 J/kg"),
+        (("speed_m_s", "mean"), 1.231, "speed off by 0.031 m/s, asked ≤ 0.030 m/s"),
+        (("speed_m_s", "mean"), None, "speed off by ?, asked ≤ 0.030 m/s"),
+        (("joints", "knee", "rmse_deg"), 4.51, "knee 4.51°, asked ≤ 4.50°"),
+        (("joints", "ankle", "rmse_deg"), None, "ankle ?, asked ≤ 4.00°"),
+        (("grf", "vertical_peak2_bw"), 1.31, "vertical_peak2_bw 1.31 BW, asked ≤ 1.30 BW"),
+        (("grf", "vertical_r"), 0.92, "vertical_r 0.920, asked ≥ 0.930"),
     ],
 )
 def test_each_limit_alone_is_missed(path, value, said):

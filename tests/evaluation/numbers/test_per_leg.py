@@ -86,6 +86,12 @@ def test_table_and_pictures_tell_the_legs_apart(recordings, tmp_path):
     print_table(gait.metrics, console)
     text = console.export_text()
     assert "feet: left intact, right passive" in text and "right: passive" in text and "ankle range" in text
+    rows = [" ".join(line.split()) for line in text.splitlines()]
+    stiffness = gait.metrics["per_leg"]["left"]["stiffness_Nm_rad"]["ankle"]["push_off"]
+    assert (
+        f"ankle stiffness, push-off N·m/rad {stiffness:.0f} 600" in rows and "stiffness is set by policy device" in rows
+    )
+    assert "both legs model people r in ±SD" in rows and any(row.startswith("both legs: ") for row in rows)
     narrow = Console(record=True, width=60, force_terminal=True, color_system=None)
     print_table(gait.metrics, narrow)
     lines = [" ".join(line.split()) for line in narrow.export_text().splitlines()]

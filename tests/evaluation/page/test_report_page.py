@@ -191,6 +191,9 @@ def test_the_verdict_is_told_in_words(walk):
     assert said["Walker"] == "1.7 m, 63 kg, both feet intact."
     assert said["Falls"].startswith("Never fell in 2 episodes") and "asked for 1.20" in said["Speed"]
     assert re.search(r"Misses \d of 14 criteria|Meets all 14 criteria", said["Joints"])
+    missed = [int(count) for text in said.values() for count in re.findall(r"Misses (\d+) of", text)]
+    limits = [limit for text in said.values() for limit in re.findall(r"\d\S*(?: \S+)?, asked ([≤≥-]? ?\d)", text)]
+    assert sum(missed) == len(limits) > 0
     faster = walked("schedule", speed=1.4)[1].metrics
     assert "No verdict: the criteria are for 1.2 m/s" in spoken_verdict(faster)["Joints"]
 

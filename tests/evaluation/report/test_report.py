@@ -20,8 +20,9 @@ from springfoot.evaluation.numbers.metrics import measure
 from springfoot.evaluation.numbers.series import GAIT_CYCLE_COLUMNS
 from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.evaluation.recording.recording import load_recording, record
-from springfoot.evaluation.report.gait_table import people_metrics, print_table
+from springfoot.evaluation.report.gait_table import people_metrics, print_table, print_tables
 from springfoot.evaluation.report.report import write_report
+from springfoot.files.markdown import plus_minus
 from springfoot.gait import SpringfootError
 from springfoot.studies.walks.bodies import draw_pairs, walk_pairs
 
@@ -120,6 +121,61 @@ def test_a_narrow_terminal_cuts_no_number_of_the_table(recording):
     assert max(map(len, tables[1].splitlines())) <= 60 and "…" not in narrow
 
 
+def walks_in(text):
+    """Return the lines of the speed, one for each table, and all lines, without the spaces that align them."""
+    lines = [" ".join(line.split()) for line in text.splitlines()]
+    return [line for line in lines if line.startswith("speed")], lines
+
+
+def test_several_policies_are_the_columns_of_one_table_unless_the_terminal_is_too_narrow(recording):
+    walks = [measure(recording).metrics, measure(walked(name="constant", push_newton=900.0)).metrics]
+    speeds = [plus_minus(walk["speed_m_s"], ".3f") for walk in walks]
+
+    def together(**console):
+        print_tables(walks, Console(file=(stream := io.StringIO()), highlight=False, **console))
+        return walks_in(stream.getvalue())
+
+    assert walks[1]["fall_reasons"]
+    for console in ({"width": 40}, {"width": 80, "force_terminal": True, "color_system": None}):  # a pipe has no width
+        rows, lines = together(**console)
+        assert rows == [f"speed m/s {speeds[0]} {speeds[1]} 1.200"]
+        assert "schedule constant people" in lines
+        assert all(f"constant: {count} × {reason}" in lines for reason, count in walks[1]["fall_reasons"].items())
+    rows, lines = together(width=60, force_terminal=True, color_system=None)
+    assert rows == [f"speed, m/s {speed} 1.200" for speed in speeds]
+    assert "model people r in ±SD" in lines
+
+
+def test_policies_beside_different_people_have_a_table_each(recording):
+    faster = walked(speed=1.4)
+    print_tables([measure(walk).metrics for walk in (recording, faster)], Console(file=(stream := io.StringIO())))
+    rows, _ = walks_in(stream.getvalue())
+    assert [row.split()[-1] for row in rows] == ["1.200", "1.400"]
+
+
+def test_a_legend_explains_the_words_of_the_table(recording):
+    text = printed(measure(recording).metrics, width=80)
+    legend = text.split("toe feedback")[1]
+    words = (
+        "people",
+        "±",
+        "return",
+        "RMSE",
+        "r",
+        "in ±SD",
+        "BW",
+        "effort",
+        "CoM",
+        "CoP",
+        "ZMP",
+        "stiffness",
+        "feedback",
+    )
+    for word in (*words, "cost of transport", "rest angles"):
+        assert f"{word}: " in legend or f"{word}, no unit: " in legend, word
+    assert "springs' rest angles planned" in text and "of both" in legend
+
+
 def test_people_beside_the_model_are_those_of_the_reference():
     people = people_metrics(BipedSettings())
     assert people["step_length_m"] == pytest.approx(0.655, abs=0.005)
@@ -190,7 +246,9 @@ def test_the_command_numbers_its_folders_and_says_where_they_are(command, tmp_pa
     assert code == 0
     assert str(Path("runs", "eval-random-2")) in out
     assert {path.name for path in (tmp_path / "runs").iterdir()} == {"eval-random-1", "eval-random-2"}
-    assert {path.name for path in (tmp_path / "runs" / "eval-random-2").iterdir()} - PARQUET == {*FILES, "report.html"}
+    written = {path.name for path in (tmp_path / "runs" / "eval-random-2").iterdir()}
+    assert written - PARQUET == {*FILES, "report.html"}
+    assert set(out.splitlines()[-1].split(", ")) == written
 
 
 @pytest.mark.slow
