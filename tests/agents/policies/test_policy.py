@@ -99,6 +99,23 @@ def test_the_mirrored_observation_has_the_mirrored_action_to_the_bit(mirrored, o
     assert np.array_equal(mirrored(observations[3]), action[3])
 
 
+def test_worlds_that_are_mirror_images_stay_so_under_a_mirrored_policy(mirrored):
+    biped = Biped(SETTINGS, 2)
+    biped.reset(np.array([0]), [0], start=0.2)
+    biped.reset(np.array([1]), [0], start=0.7)
+    observation = biped.observe()
+    for _ in range(50):
+        result = biped.step(mirrored(observation))
+        observation = result.observation
+    angle = biped.measurement.angle
+    np.testing.assert_allclose(angle[0], angle[1, ::-1], atol=1e-6)
+    for joint in ("ankle", "toe"):
+        left, right = (result.info[f"stiffness/{joint}_{side}"] for side in ("left", "right"))
+        np.testing.assert_allclose(left, right[::-1], rtol=1e-5)
+    assert np.abs(angle[0] - angle[0, ::-1]).max() > 0.1
+    assert result.reward[0] == pytest.approx(result.reward[1], abs=1e-6)
+
+
 def test_a_plain_policys_header_has_no_word_of_mirrors(policy, mirrored):
     assert "mirrored" not in policy.header["network"] and mirrored.header["network"]["mirrored"] is True
     assert mirrored.layer_sizes == [43, 64, 64, 2] and (policy.action_count, mirrored.action_count) == (4, 4)
