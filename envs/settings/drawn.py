@@ -141,7 +141,8 @@ def _entries(
         if kind is DrawnFoot and "foot" not in plain:
             raise SpringfootError(f"{label} needs a foot")
         weight = require_number(f"{label}: weight", plain.get("weight", 1.0), 0.0, 1e6, above=True)
-        entries.append(checked(label, kind(**{**plain, "weight": weight})))
+        named: dict[str, Any] = {**plain, "weight": weight}
+        entries.append(checked(label, kind(**named)))
     return tuple(entries)
 
 
