@@ -42,7 +42,7 @@ class DrawnFoot:
         return {item.name: getattr(self, item.name) for item in fields(self)}
 
     @cached_property
-    def softest(self) -> Foot:
+    def example(self) -> Foot:
         """Return the foot with every range at its low end. All draws have its lines, schedule and one-way springs."""
         return FootSetting(_end_of(self.foot, 0)).foot
 
