@@ -102,8 +102,51 @@ PREDICTED = replace(
 """Task of a body that follows its own plan: the action is a factor on the schedule found with its leg constants. The
 reward pays for CoM, speed and ZMP of the plan and charges effort; angles and forces do not count."""
 
+DRAWN_FEET = [
+    {"foot": "intact", "on": "both", "weight": 30},
+    {"foot": {"kind": "intact", "orthosis": {"ankle_stiffness": [20, 520]}}, "on": "both", "weight": 12},
+    {"foot": {"kind": "intact", "orthosis": {"ankle_stiffness": [20, 520]}}, "weight": 3},
+    {
+        "foot": {"kind": "intact", "orthosis": {"ankle_stiffness": [20, 520], "engages": "dorsiflexion"}},
+        "on": "both",
+        "weight": 5,
+    },
+    {
+        "foot": {"kind": "intact", "foot_mass_ratio": [0.8, 2.0], "shank_mass_ratio": [0.9, 1.3]},
+        "on": "both",
+        "weight": 4,
+    },
+    {"foot": {"kind": "weak", "strength": [0.15, 0.6]}, "weight": 3},
+    {"foot": {"kind": "weak", "strength": [0.15, 0.6]}, "on": "both", "weight": 5},
+    {
+        "foot": {"kind": "weak", "strength": [0.15, 0.6], "orthosis": {"ankle_stiffness": [20, 520]}},
+        "on": "both",
+        "weight": 6,
+    },
+    {"foot": {"kind": "weak", "strength": [0.15, 0.6], "orthosis": {"ankle_stiffness": [20, 520]}}, "weight": 3},
+    {
+        "foot": {"kind": "passive", "ankle_stiffness": [150, 1500], "ankle_deg": [0, 8], "toe_stiffness": [15, 110]},
+        "weight": 14,
+    },
+    {"foot": {"kind": "adaptive", "ankle_deg": [0, 8]}, "weight": 3},
+    {"foot": "rigid", "weight": 6},
+    {"foot": "rigid_toe", "weight": 2},
+    {"foot": "no_toe", "weight": 2},
+    {"foot": "drop", "weight": 2},
+]
+"""Feet that a person learns to walk on; sound ones come often enough, as the person's walk on them is the measure."""
+DRAWN_BODIES = [
+    {"weight": 6},
+    {"carried_ratio": 0.1},
+    {"carried_ratio": 0.2},
+    {"leg_ratio": 0.95, "foot_ratio": 0.95},
+    {"leg_ratio": 1.05, "foot_ratio": 1.05},
+]
+"""Proportions and loads that a person learns to walk with."""
 PERSON = replace(
     TRAINED_ON,
+    drawn_feet=DRAWN_FEET,
+    drawn_bodies=DRAWN_BODIES,
     acts="both",
     action_mode="residual",
     stiffness_by="drawn",

@@ -107,7 +107,7 @@ class Biped(ExactState):
         speeds = np.array([walk.speed for walk in self.walks])
         self.subjects = Subjects(settings, speeds, num_envs, variant, len(self.constants))
         self._worn = WornFeet(settings, feet or [settings.feet] * num_envs)
-        incline = slope_table(slope or slope_constants())
+        self._incline = slope_table(slope or slope_constants()).table
         self._legs = LegController(table, self.subjects, right)
         planned, stiffness = foot_tables(settings, (*table, *right))
         # Tables have a row for each body, variant and speed, and as many again for right legs of their own.
@@ -145,16 +145,7 @@ class Biped(ExactState):
         forces = np.zeros((self.windows_per_step, num_envs, len(SIDES), len(CONTACTS), 2))
         self._control = np.zeros((num_envs, len(SIDES), len(JOINTS), 2))
         self._rows = tuple(EnvironmentRows(self.subjects.rows, self._task.rows, forces, self._control))
-        self._tables = tuple(
-            Tables(
-                rest=self._springs.rest.table,
-                schedule=self._springs.schedule.table,
-                legs=self._legs.table.table,
-                incline=incline.table,
-                feet=self._springs.feet,
-                target=self._task.table,
-            )
-        )
+        self._tables = self._made_tables()
         self._physics = tuple(self._simulation.arrays)
         self._kept = {"control": self.subjects.rows, "task": self._task.rows} | self._simulation.kept
         if settings.drawn_bodies is not None:
@@ -281,7 +272,20 @@ class Biped(ExactState):
 
     def _fit_springs(self, ids: list[int]) -> None:
         if self._springs.fit(ids):
-            self._tables = tuple(Tables(*self._tables)._replace(feet=self._springs.feet))
+            self._tables = self._made_tables()
+
+    def _made_tables(self) -> tuple[Any, ...]:
+        """Return the tables of the kernels, `Tables`."""
+        return tuple(
+            Tables(
+                rest=self._springs.rest.table,
+                schedule=self._springs.schedule.table,
+                legs=self._legs.table.table,
+                incline=self._incline,
+                feet=self._springs.feet,
+                target=self._task.table,
+            )
+        )
 
     def _embody(self, ids: NDArray, numbers: Mapping[str, NDArray], feet: Any) -> None:
         replaced = [OWN_FEET] * len(ids) if feet is None else self._worn.from_json(feet, len(ids))

@@ -28,7 +28,7 @@ class WornFeet:
         self._replaced = [OWN_FEET] * len(own)
         self.pairs = list(own)
         """Left and right foot of each environment now."""
-        self.known = [*dict.fromkeys(own), *((entry.softest, entry.softest) for entry in self._drawn)]
+        self.known = [*dict.fromkeys(own), *((entry.example, entry.example) for entry in self._drawn)]
         """Pairs with every torque-angle line, schedule and one-way spring of the environments' own and drawn feet."""
         self.one_way = any(map(act_one_way, self.known))
         """True if any of them acts one way."""

@@ -6,6 +6,7 @@ every body: they do not scale.
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 from math import inf, pi
 
 from springfoot.gait.body.body import Body
@@ -26,12 +27,18 @@ class Spring:
     damping_time: float | None = None
     """Damping over stiffness [s]; None for that of the joint's muscles (`envs.physics.model.damping_times`)."""
     armature: float = 0.0
-    """Inertia of the joint beside its own [kg m^2]."""
+    """Inertia of the joint beside its own [kg m^2]; 0 for that of `envs.physics.model.armatures_of`."""
     table: tuple[tuple[float, float], ...] = ()
     """Angles [rad], ascending, and torques [N m], falling, in place of stiffness and rest angle; lines between them."""
     engages: str | None = None
     """Way beyond `rest` in which alone it acts, one of `WAYS` (of a toe: up, down); None for both. Only an orthosis may
     act one way, then without damping."""
+
+    @property
+    def steepest(self) -> float:
+        """Return the largest fall of the torque with the angle [N m/rad]: the stiffness, or that of the line."""
+        falls = [(torque - below) / (above - angle) for (angle, torque), (above, below) in pairwise(self.table)]
+        return max([self.stiffness, *falls])
 
     @property
     def slack(self) -> tuple[float, float]:

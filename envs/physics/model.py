@@ -98,10 +98,18 @@ def torque_ranges(body: Body, feet: Feet) -> NDArray:
 
 
 def armatures_of(body: Body, feet: Feet) -> NDArray:
-    """Return the armature of the joints of both legs [kg m^2], (side, joint)."""
-    own = np.array(ARMATURE) * body.mass_scale * body.length_scale**2
-    devices = [[joint.device.armature if joint.device else 0.0 for joint in joints_of(foot)] for foot in feet]
-    return own + np.array(devices)
+    """Return the armature of the joints of both legs [kg m^2], (side, joint): that of muscles, and a device's.
+
+    A device without an armature of its own has h K beta / 2, h the physics step: as with `LOCK`, its contacts would
+    else give the body energy.
+    """
+    armature = np.array(ARMATURE) * body.mass_scale * body.length_scale**2 + np.zeros((len(SIDES), len(JOINTS)))
+    beta = damping_times_of(body, feet)
+    for side, foot in enumerate(feet):
+        for joint, described in enumerate(joints_of(foot)):
+            if device := described.device:
+                armature[side, joint] += device.armature or 0.5 * PHYSICS_STEP * device.steepest * beta[side, joint]
+    return armature
 
 
 def passive_damping(body: Body) -> np.ndarray:

@@ -42,7 +42,7 @@ class DrawnFoot:
         return {item.name: getattr(self, item.name) for item in fields(self)}
 
     @cached_property
-    def softest(self) -> Foot:
+    def example(self) -> Foot:
         """Return the foot with every range at its low end. All draws have its lines, schedule and one-way springs."""
         return FootSetting(_end_of(self.foot, 0)).foot
 
@@ -141,7 +141,8 @@ def _entries(
         if kind is DrawnFoot and "foot" not in plain:
             raise SpringfootError(f"{label} needs a foot")
         weight = require_number(f"{label}: weight", plain.get("weight", 1.0), 0.0, 1e6, above=True)
-        entries.append(checked(label, kind(**{**plain, "weight": weight})))
+        named: dict[str, Any] = {**plain, "weight": weight}
+        entries.append(checked(label, kind(**named)))
     return tuple(entries)
 
 

@@ -54,6 +54,19 @@ def test_flags_that_were_not_given_are_not_given():
     assert flagged("--stop-at", "None", "--height-range", "None") == {"stop_at": None, "height_range": None}
 
 
+def test_lists_are_json_text_or_a_file(tmp_path):
+    feet = [{"foot": {"kind": "passive", "ankle_stiffness": [150, 1500]}, "on": "both"}, {"foot": "rigid"}]
+    (tmp_path / "feet.json").write_text(json.dumps(feet))
+    words = ["--drawn-feet", json.dumps(feet), "--drawn-bodies", "None"]
+    assert flagged(*words) == {"drawn_feet": feet, "drawn_bodies": None}
+    assert flagged("--drawn-feet", str(tmp_path / "feet.json")) == {"drawn_feet": feet}
+    (tmp_path / "foot.json").write_text(json.dumps(feet[0]))
+    with pytest.raises(SystemExit):
+        flagged("--drawn-feet", str(tmp_path / "foot.json"))
+    config = train_command.configured(PRESETS["walk"], {}, flagged(*words))
+    assert settings_to_json(config.environment)["drawn_feet"][0]["foot"]["ankle_stiffness"] == [150.0, 1500.0]
+
+
 def test_help_groups_the_settings_by_theme_and_says_what_a_trained_policy_brings(monkeypatch, capsys):
     monkeypatch.setenv("COLUMNS", "100")
     with pytest.raises(SystemExit):

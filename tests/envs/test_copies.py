@@ -29,6 +29,11 @@ SETTINGS: dict[str, dict[str, Any]] = {
         "sensor_noise": 0.01,
         "stiffness_delay_range_s": (0, 0.03),
     },
+    "feet and proportions": SHORT
+    | {
+        "drawn_feet": [{"foot": {"kind": "passive", "ankle_stiffness": [300, 900]}}, {"foot": "rigid", "on": "both"}],
+        "drawn_bodies": [{"leg_ratio": 1.03}, {"carried_ratio": 0.2}],
+    },
     "standing": {"start": "standing", "stop_at": 3.5, "episode_seconds": 4.0},
     "decided at events": {"decisions": "event", "action_mode": "residual", "episode_seconds": 0.8},
 }

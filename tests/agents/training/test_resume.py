@@ -24,15 +24,17 @@ from springfoot.cli.train import train_main
 from springfoot.errors import SpringfootError
 from springfoot.files.locks import OWNER
 
+DRAWN_FEET = [{"foot": {"kind": "passive", "ankle_stiffness": [300.0, 900.0]}, "weight": 2.0}, {"foot": "intact"}]
 FLAGS = (
     *("--preset", "any-body", "--timesteps", "2500", "--num-envs", "8", "--threads", "1", "--update-steps", "256"),
     *("--minibatches", "2", "--eval-interval", "1024", "--eval-episodes", "2", "--episode-seconds", "1.5"),
+    *("--drawn-feet", json.dumps(DRAWN_FEET)),
 )
 CONFIG = dataclasses.replace(
     PRESETS["any-body"],
     **{"timesteps": 2500, "num_envs": 8, "threads": 1, "update_steps": 256, "minibatches": 2},
     **{"eval_interval": 1024, "eval_episodes": 2},
-    environment=dataclasses.replace(PRESETS["any-body"].environment, episode_seconds=1.5),
+    environment=dataclasses.replace(PRESETS["any-body"].environment, episode_seconds=1.5, drawn_feet=DRAWN_FEET),  # type: ignore[arg-type]
 )
 
 

@@ -40,6 +40,15 @@ SETTINGS: dict[str, dict[str, Any]] = {
         "unevenness_m": 0.01,
         "episode_seconds": 1.0,
     },
+    "drawn feet and bodies": {
+        "drawn_feet": [
+            {"foot": {"kind": "passive", "ankle_stiffness": [300, 900], "toe_deg": [0, 5]}},
+            {"foot": {"kind": "passive", "ankle_table": [[-10.0, 60.0], [20.0, -100.0]]}, "on": "both"},
+            {"foot": {"kind": "drop", "orthosis": {"ankle_stiffness": [20, 90], "engages": "plantarflexion"}}},
+        ],
+        "drawn_bodies": [{"leg_ratio": 1.03}, {"carried_ratio": 0.2}],
+        "episode_seconds": 0.8,
+    },
     "setting off": {"start": "standing", "stop_at": 4.0},
     "stopping": {"stop_at": 0.3, "decisions": "100hz"},
 }

@@ -142,9 +142,9 @@ def test_a_batch_gives_the_bits_of_batches_of_one(threads):
         assert_same(walk(alone, [index]), [values[index : index + 1] for values in expected])
 
 
-def test_drawing_changes_no_other_random_number():
-    """Phase, noise and pushes of an environment are those without drawn feet: what is drawn later comes last."""
-    plain, drawn = (SegmentedFootBiped(start_noise=0.05, **more) for more in ({}, {"drawn_feet": [{"foot": "intact"}]}))
+def test_feet_are_drawn_after_phase_noise_and_pushes():
+    """So these are the same with drawn feet and without."""
+    plain, drawn = (SegmentedFootBiped(start_noise=0.05, drawn_feet=feet) for feet in (None, [{"foot": "intact"}]))
     seen, info = plain.reset(seed=4)
     same, same_info = drawn.reset(seed=4)
     np.testing.assert_array_equal(seen, same)
