@@ -29,6 +29,8 @@ def draw_source(settings: BipedSettings, random: np.random.Generator) -> tuple[i
     source = settings.stiffness_by
     if source == "drawn":
         source = "action" if random.random() < 0.5 else DRAWN_SOURCES[random.integers(len(DRAWN_SOURCES))]
+    if source == "action" and settings.acts == "person":
+        source = "schedule"
     drawn = np.zeros(4)
     if source == "scaled":
         drawn = np.tile(random.uniform(-1.0, 1.0, 2), 2)  # ankle and toe, alike on both legs
@@ -53,13 +55,13 @@ class PersonActions:
         self._source = rows["source"]
         self._offset = rows["person"]["offset"]
         self._last_offset = rows["person"]["last_offset"]
-        self._may_draw = settings.stiffness_by != "action"
+        self._others_may = settings.stiffness_by != "action" or settings.acts == "person"
 
     def reset(self, ids: NDArray, randoms: Sequence[np.random.Generator]) -> None:
         """Begin an episode of bodies `ids` (K,), each drawing with its generator in `randoms` (K,)."""
         self._offset[ids] = 0.0
         self._last_offset[ids] = 0.0
-        if self._may_draw:
+        if self._others_may:
             for index, random in zip(ids.tolist(), randoms, strict=True):
                 self._source[index] = draw_source(self._settings, random)
 
@@ -83,7 +85,7 @@ class PersonActions:
             running: (N,) bodies that take the step; a stiffness drawn anew is drawn for them.
             randoms: (N,) their generators.
         """
-        if not self._may_draw:
+        if not self._others_may:
             return
         source = self._source
         for index in np.flatnonzero(running & (source["anew"] > 0)).tolist():

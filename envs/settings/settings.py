@@ -192,8 +192,9 @@ class BipedSettings:
     policy file of a training with `acts` `both` or `person`."""
     person_range_deg: float = field(default=14.0, metadata=_PERSON)
     """Largest offset of a rest angle, that of an action of 1 [0..30 deg]."""
-    stiffness_by: StiffnessBy = field(default="action", metadata=_PERSON)
-    """Who sets the stiffness where the action moves the person: the action; the fixed schedule; the schedule times a
+    stiffness_by: StiffnessBy = field(default="action", metadata=_PERSON | _REPLACED)
+    """Who sets the stiffness where the action moves the person: the action, with `acts` `person` the fixed schedule;
+    that schedule always (schedule); the schedule times a
     factor drawn at each reset (scaled); one drawn stiffness of the ankles and one of the toes (constant); one drawn
     anew in every step (random); or a drawn one of these, in half of the episodes the action (drawn)."""
     human: OwnGait | None = field(default=None, metadata=_REFERENCE)
@@ -332,10 +333,6 @@ class BipedSettings:
             raise SpringfootError(f"acts {self.acts!r}: the action is the person, which must be 'tuned' then")
         if self.decisions not in ("50hz", "event"):
             raise SpringfootError(f"acts {self.acts!r} needs steps of 20 ms, decisions '50hz' or 'event'")
-        if self.acts == "person" and self.stiffness_by in ("action", "drawn"):
-            raise SpringfootError(
-                f"acts 'person' has no action for stiffness: stiffness_by must be another, got {self.stiffness_by!r}"
-            )
 
     def _check_world(self) -> None:
         """Raise `SpringfootError` for bad ground, noise or delays."""

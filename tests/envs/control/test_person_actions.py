@@ -148,7 +148,6 @@ def test_alone_as_in_a_batch_and_from_a_kept_state_to_the_bit() -> None:
     ("settings", "message"),
     [
         ({"acts": "legs"}, "acts must be one of 'stiffness', 'person', 'both', got 'legs'"),
-        ({"acts": "person"}, "acts 'person' has no action for stiffness"),
         ({"acts": "both", "decisions": "25hz"}, "acts 'both' needs steps of 20 ms"),
         ({"acts": "both", "person": "x"}, "acts 'both': the action is the person, which must be 'tuned' then"),
         ({"stiffness_by": "schedule"}, "stiffness_by 'schedule' needs acts 'person' or 'both'"),
