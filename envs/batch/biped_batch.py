@@ -172,6 +172,11 @@ class Biped(ExactState):
         return self._legs.phase.copy()
 
     @property
+    def feet(self) -> list[Feet]:
+        """Left and right foot of each body now; a copy."""
+        return list(self._worn.pairs)
+
+    @property
     def controlled(self) -> NDArray:
         """Return (N, side, 2) True where actions set the stiffness of ankle and toe; others are read as 0. A copy."""
         rows = self.subjects.rows

@@ -1,0 +1,229 @@
+"""Ask how persons walk whom nobody tuned: on drawn bodies, feet, speeds and slopes, and on sound feet beside people.
+
+    springfoot study persons runs/person
+
+A person is a policy that `train.py --preset person` trained. The drawn episodes have the ranges of
+that preset and seeds that no training uses; in each the commanded speed stays.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+import tyro
+
+from springfoot.agents.policies import PolicyFunction
+from springfoot.agents.training import PRESETS
+from springfoot.arrays import NDArray
+from springfoot.envs import Biped, BipedSettings
+from springfoot.envs.batch import walked_steps
+from springfoot.envs.physics import Feet
+from springfoot.errors import SpringfootError, require_count
+from springfoot.evaluation.numbers import measure
+from springfoot.evaluation.recording import policy_and_settings, record
+from springfoot.files.markdown import MISSING, table, text_of
+from springfoot.files.writing import csv_text
+
+from ..base.study import Answer, OnProgress, WalkingStudy
+
+SPEEDS = (0.9, 1.0, 1.2, 1.4, 1.5)
+"""Commanded speeds on sound feet [m/s]."""
+FIRST_SEED = 50_000_000
+"""Seed of the first drawn episode; trainings use others."""
+SETTLED_SECONDS = 3.0
+"""Time after which the speed counts [s]; chosen, two strides or more."""
+PUSH_NEWTON = 100.0
+"""Size of the pushes [N]."""
+SLOPES_DEG = (-5.0, 5.0)
+"""Slopes on sound feet [deg]."""
+PEAKS = ("vertical_peak1_bw", "vertical_peak2_bw")
+"""Peaks of the mean vertical force."""
+_BATCH = 100
+"""Drawn episodes side by side; chosen."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class DrawnEpisode:
+    """One drawn episode."""
+
+    foot: str
+    """The feet in words, as `feet_in_words`."""
+    speed: float
+    """Commanded speed [m/s]."""
+    walked: float
+    """Mean speed of the CoM after `SETTLED_SECONDS` [m/s]; NaN if it fell before."""
+    fell: bool
+
+
+def feet_in_words(feet: Feet) -> str:
+    """Return kinds and braces of a pair of feet, such as "intact, braced (both)" or "passive"."""
+    names = [f"{foot.kind}, braced" if foot.ankle.orthosis else foot.kind for foot in feet]
+    left, right = names
+    if left == right:
+        return left if left == "intact" else f"{left} (both)"
+    return right if left == "intact" else left
+
+
+def walk_drawn(
+    act: PolicyFunction, settings: BipedSettings, episodes: int, threads: int, progress: OnProgress
+) -> list[DrawnEpisode]:
+    """Walk so many drawn episodes, seeded from `FIRST_SEED` on; return them in order."""
+    walked = []
+    for first in range(0, episodes, _BATCH):
+        count = min(_BATCH, episodes - first)
+        biped = Biped(settings, count, threads)
+        biped.reset(np.arange(count), [FIRST_SEED + first + index for index in range(count)])
+        feet = [feet_in_words(pair) for pair in biped.feet]
+        speed = biped.subjects.speed.copy()
+        way = np.zeros(count)
+        steps = np.zeros(count)
+        fell = np.zeros(count, bool)
+        time = 0.0
+        for active, result in walked_steps(biped, act):
+            time += biped.dt
+            if time > SETTLED_SECONDS:
+                way[active] += result.info["speed"][active]
+                steps[active] += 1
+            fell |= active & result.terminated
+            progress(float(active.sum()) * biped.dt)
+        mean = np.divide(way, steps, out=np.full(count, np.nan), where=steps > 0)
+        walked += [
+            DrawnEpisode(foot=foot, speed=float(asked), walked=float(kept), fell=bool(down))
+            for foot, asked, kept, down in zip(feet, speed, mean, fell, strict=True)
+        ]
+    return walked
+
+
+def speed_errors(episodes: Sequence[DrawnEpisode]) -> NDArray:
+    """Return the distance of the walked from the commanded speed [m/s] of the episodes that did not fall."""
+    return np.array([abs(episode.walked - episode.speed) for episode in episodes if not episode.fell])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Persons(WalkingStudy):
+    """Walk learned persons on drawn bodies, feet, speeds and slopes, and on sound feet beside people."""
+
+    persons: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="PERSON ...")] = ()
+    """Policies that move the person: run folders or files."""
+    drawn: int = 2000
+    """Drawn episodes of each person, and as many pushed."""
+
+    QUICK: ClassVar = {"episodes": 1, "seconds": 6.0, "drawn": 2}
+
+    def check(self) -> None:
+        """Refuse counts out of range, and no person."""
+        super().check()
+        require_count("drawn", self.drawn)
+        if not self.persons:
+            raise SpringfootError("name one or more persons: folders or files of train.py --preset person")
+
+    @property
+    def total(self) -> float:
+        """Simulated seconds without falls."""
+        sound = self.episodes * (len(SPEEDS) + len(SLOPES_DEG))
+        return len(self.persons) * self.seconds * (2 * self.drawn + sound)
+
+    def ask(self, progress: OnProgress) -> Answer:
+        """Walk every person."""
+        drawn: dict[str, dict[float, list[DrawnEpisode]]] = {}
+        sound: list[dict[str, Any]] = []
+        for name in self.persons:
+            act, settings = policy_and_settings(name, {})
+            if settings.acts == "stiffness":
+                raise SpringfootError(f"{name} moves no person: it was trained with acts 'stiffness'")
+            ranges = replace(
+                PRESETS["person"].environment,
+                acts=settings.acts,
+                stiffness_by="action",
+                person_range_deg=settings.person_range_deg,
+                speed_interval=None,
+                episode_seconds=self.seconds,
+            )
+            drawn[name] = {
+                push: walk_drawn(act, replace(ranges, push_newton=push), self.drawn, self.threads, progress)
+                for push in (0.0, PUSH_NEWTON)
+            }
+            sound += [self.sound_walk(name, {"speed": speed}, progress) for speed in SPEEDS]
+            sound += [self.sound_walk(name, {"slope_deg": slope}, progress) for slope in SLOPES_DEG]
+        files = {
+            "drawn.csv": _drawn_csv(drawn),
+            "sound.csv": csv_text(list(sound[0]), [list(r.values()) for r in sound]),
+        }
+        about = f"Drawn episodes: {self.drawn} × {self.seconds:g} s. Sound feet: {self.what_ran}."
+        return Answer(text=f"{drawn_table(drawn)}\n\n{sound_table(sound)}\n\n{about}", files=files)
+
+    def sound_walk(self, name: str, given: dict[str, Any], progress: OnProgress) -> dict[str, Any]:
+        """Return numbers of a person's walk on sound feet, the likeness to people's level walk at that speed."""
+        act, settings = policy_and_settings(name, {**given, "episode_seconds": self.seconds})
+        metrics = measure(record(act, settings, name=name, progress=progress, **self.how)).metrics
+        joints = metrics["joints"]
+        force = metrics["grf"]
+        return {
+            "person": name,
+            "speed_m_s": settings.speed,
+            "slope_deg": settings.slope_deg,
+            "falls": metrics["falls"],
+            "episodes": metrics["episodes"],
+            "walked_m_s": metrics["speed_m_s"]["mean"],
+            **{f"{joint}_rms_deg": joints[joint]["rmse_deg"] for joint in ("thigh", "knee", "ankle")},
+            "vertical_r": force["vertical_r"],
+            "forward_r": force["forward_r"],
+            "peak_bw": max((force[peak] for peak in PEAKS if force[peak] is not None), default=None),
+            "fibre_J_kg_m": metrics["effort"]["fibre_J_kg_m"],
+            "effort": metrics["effort"]["total"],
+        }
+
+
+def drawn_table(drawn: dict[str, dict[float, list[DrawnEpisode]]]) -> str:
+    """Return the Markdown table of falls by foot and of the held speed, a column for each person."""
+    calm = {name: pushed[0.0] for name, pushed in drawn.items()}
+    shaken = {name: pushed[PUSH_NEWTON] for name, pushed in drawn.items()}
+    feet = sorted({episode.foot for episodes in calm.values() for episode in episodes})
+    lines = [
+        [f"falls, {foot}", *(_falls([e for e in calm[name] if e.foot == foot]) for name in drawn)] for foot in feet
+    ]
+    lines.append(["falls, all", *(_falls(calm[name]) for name in drawn)])
+    lines.append([f"falls, pushed by ±{PUSH_NEWTON:g} N", *(_falls(shaken[name]) for name in drawn)])
+    errors = {name: speed_errors(episodes) for name, episodes in calm.items()}
+    for label, percent in (("speed error, median [m/s]", 50), ("speed error, 95 % [m/s]", 95)):
+        lines.append([label, *(f"{np.percentile(e, percent):.3f}" if len(e) else MISSING for e in errors.values())])
+    return table(["drawn episodes", *drawn], lines)
+
+
+def _falls(episodes: Sequence[DrawnEpisode]) -> str:
+    """Return the falls of so many episodes in words."""
+    return f"{sum(episode.fell for episode in episodes)} of {len(episodes)}"
+
+
+def sound_table(rows: Sequence[dict[str, Any]]) -> str:
+    """Return the Markdown table of walks on sound feet; `rows` as of `Persons.sound_walk`."""
+    head = ["sound feet", "falls", "walked m/s", "thigh / knee / ankle °", "forces r", "peak BW", "fibre work J/kg/m"]
+    lines = []
+    for row in rows:
+        angles = " / ".join(text_of(row[f"{joint}_rms_deg"], ".1f") for joint in ("thigh", "knee", "ankle"))
+        forces = " / ".join(text_of(row[f"{way}_r"], ".3f") for way in ("vertical", "forward"))
+        slope = f", {row['slope_deg']:+g}°" if row["slope_deg"] else ""
+        lines.append(
+            [
+                f"{row['person']}, {row['speed_m_s']:g} m/s{slope}",
+                f"{row['falls']} of {row['episodes']}",
+                text_of(row["walked_m_s"], ".3f"),
+                angles,
+                forces,
+                text_of(row["peak_bw"], ".2f"),
+                text_of(row["fibre_J_kg_m"], ".2f"),
+            ]
+        )
+    return table(head, lines)
+
+
+def _drawn_csv(drawn: dict[str, dict[float, list[DrawnEpisode]]]) -> str:
+    """Return all drawn episodes as CSV text."""
+    lines = [
+        [name, push, episode.foot, episode.speed, episode.walked, int(episode.fell)]
+        for name, pushed in drawn.items()
+        for push, episodes in pushed.items()
+        for episode in episodes
+    ]
+    return csv_text(["person", "push_N", "foot", "speed_m_s", "walked_m_s", "fell"], lines)
