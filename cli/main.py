@@ -136,7 +136,8 @@ def _run(words: list[str]) -> int:
         extra = "train" if words[0] == "train" else ""  # `train` needs all of its extra
         print(f"springfoot {words[0]}: error: {missing(error.name, extra)}", file=sys.stderr)
         return 2
-    known = f"there are {', '.join(COMMANDS)}{perhaps(words[0], COMMANDS)}"
+    *others, last = COMMANDS
+    known = f"there are {', '.join(others)} and {last}{perhaps(words[0], COMMANDS)}"
     print(f"springfoot: error: no command {words[0]!r:.60}; {known}", file=sys.stderr)
     return 2
 
