@@ -217,7 +217,9 @@ def build_model(
     body: Body, friction: float = FRICTION, feet: Feet = SOUND, *, one_way: bool = False, loaded: bool = False
 ) -> mujoco.MjModel:
     """Return the compiled model of `body` with these feet, as `build_spec` says."""
-    return build_spec(body, friction, feet, one_way=one_way, loaded=loaded).compile()
+    spec = build_spec(body, friction, feet, one_way=one_way, loaded=loaded)
+    spec.compiler.usethread = False  # on busy cores threads start ten times later than this compiles
+    return spec.compile()
 
 
 def _load(trunk, body: Body) -> None:
