@@ -10,12 +10,7 @@ from math import exp
 import numpy as np
 
 from springfoot.arrays import NDArray
-from springfoot.gait.body.tissue import (
-    RELAXED_STIFFNESS,
-    STIFFNESS_PER_TORQUE,
-    TENDON_SHARE,
-    muscle_in_series,
-)
+from springfoot.gait.body.tissue import charged_calf_stiffness
 from springfoot.gait.plan.effort import ACTIVATION_TIME
 
 from ..control.constants import LegConstants
@@ -171,27 +166,22 @@ def remember(rows, bodies, options, running) -> None:
             rows[i].velocity[:] = m.velocity
 
 
-_muscle_in_series = part(muscle_in_series)
+_charged_calf_stiffness = part(charged_calf_stiffness)
 
 
 @part
 def _charged_stiffness(scale, controls, body, tendon, side, joint):
     """Return the K of the muscles at one joint that the term `stiffness` charges [N m/rad].
 
-    All of it; of an ankle with a `tendon` [N m/rad], 0 for none, the calf's own K in series with it, beyond
-    `RELAXED_STIFFNESS` and what its torque brings.
+    All of it; of an ankle with a `tendon` [N m/rad], 0 for none, `charged_calf_stiffness`.
     """
     stiffness = muscle_stiffness(controls.springs, side, joint)
     if joint > 0 or tendon == 0.0 or stiffness == 0.0:
         return stiffness
     angle = body.measured.angle[side]
     unit = scale.stiffness_scale
-    # Calf and tendon alone: K may be below the tissue's, and the angles have moved on since it was bounded.
-    together = stiffness - unit * tissue_stiffness(angle[KNEE], angle[ANKLE])
-    together = min(max(together, 0.0), TENDON_SHARE * unit * tendon)
-    torque = abs(body.muscles.moment[0, side, ANKLE])
-    own = _muscle_in_series(together, unit * tendon)
-    return max(own - unit * RELAXED_STIFFNESS - STIFFNESS_PER_TORQUE * torque, 0.0)
+    tissue = unit * tissue_stiffness(angle[KNEE], angle[ANKLE])
+    return _charged_calf_stiffness(stiffness, tissue, body.muscles.moment[0, side, ANKLE], tendon, unit)
 
 
 @part
@@ -206,7 +196,7 @@ def judge(rows, controls, bodies, table, options, forces, terms) -> None:
     (fourfold), both components beyond mean +- 0.5 SD at the leg's phase.
     Costs >= 0: `stiffness_rate`, squared change of the action in 20 ms; `stiffness`, mean over legs of
     [(K_ankle/300)^2 + (K_toe/60)^2/4]/1.25, K of the muscles that act (a slack joint and a device in their place cost
-    nothing; with a tendon see `_charged_stiffness`), scaled to 1.70 m and 63 kg; `effort`, positive work of hips,
+    nothing; with a tendon see `charged_calf_stiffness`), scaled to 1.70 m and 63 kg; `effort`, positive work of hips,
     knees, ankles and toes in the step over body weight times commanded way: the cost of transport of that step. The
     price of the muscles (`springfoot.gait.plan.effort`), one control window late: `fibre_work`, metabolic energy of
     their fibres over body weight times commanded way; `activation`, mean over the step of the squared activation by

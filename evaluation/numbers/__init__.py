@@ -6,7 +6,7 @@ from springfoot.lazy import lazy_names
 
 if TYPE_CHECKING:
     from .criteria import HUMAN_LIKE, NO_FALLS, WALKS, Criterion, number_text, unmet, with_derived
-    from .effort import mean_effort
+    from .effort import mean_effort, stiffness_charge
     from .metrics import MOMENT_CURVES, Gait, measure
     from .per_leg import asymmetry, leg_numbers
     from .series import foot_contacts, strides_within
@@ -28,6 +28,7 @@ __all__ = [
     "mean_effort",
     "measure",
     "number_text",
+    "stiffness_charge",
     "strides_within",
     "unmet",
     "with_derived",
@@ -53,6 +54,7 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
             "measure": "metrics",
             "number_text": "criteria",
             "with_derived": "criteria",
+            "stiffness_charge": "effort",
             "strides_within": "series",
             "unmet": "criteria",
         },

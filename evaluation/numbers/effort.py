@@ -8,11 +8,17 @@ import numpy as np
 
 from springfoot.arrays import NDArray
 from springfoot.envs.physics.foot import Feet
-from springfoot.envs.physics.model import JOINTS, SIDES
+from springfoot.envs.physics.model import ANKLE, JOINTS, KNEE, SIDES
 from springfoot.envs.physics.muscles import leg_strengths
+from springfoot.envs.settings.settings import body_of
+from springfoot.envs.task.scales import ANKLE_STIFFNESS_UNIT, TOE_SHARE, TOE_STIFFNESS_UNIT
+from springfoot.errors import SpringfootError
 from springfoot.gait import GRAVITY, Body
+from springfoot.gait.body.tissue import STIFFNESS_PER_TORQUE, ankle_tissue_stiffness, charged_calf_stiffness
 from springfoot.gait.plan.effort import (
+    AS_IS,
     Effort,
+    Muscle,
     MuscleUse,
     beyond_range,
     mean_squared_acceleration,
@@ -20,7 +26,7 @@ from springfoot.gait.plan.effort import (
     muscle_use,
 )
 
-from ..recording.recording import TICK
+from ..recording.recording import TICK, Recording
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -41,7 +47,9 @@ class EpisodeEffort:
     """`Effort.beyond_range` of the worse leg [deg]."""
 
 
-def episode_effort(series: dict[str, NDArray], body: Body, feet: Feet, first: int, last: int) -> EpisodeEffort | None:
+def episode_effort(
+    series: dict[str, NDArray], body: Body, feet: Feet, first: int, last: int, muscle: Muscle = AS_IS
+) -> EpisodeEffort | None:
     """Measure the effort of one episode in the ticks from `first` up to `last`; None for less than 3 ticks.
 
     Args:
@@ -49,6 +57,7 @@ def episode_effort(series: dict[str, NDArray], body: Body, feet: Feet, first: in
         body: that walked, on these `feet`.
         first: tick from which the walk is steady.
         last: its end.
+        muscle: factors on properties of the muscles.
     """
     if last - first < 3:
         return None
@@ -59,6 +68,7 @@ def episode_effort(series: dict[str, NDArray], body: Body, feet: Feet, first: in
         TICK,
         leg_strengths(body, feet),
         body.stiffness_scale,
+        muscle,
     )
     inner = slice(first + 1, last - 1)  # the ticks that `use` is of
     return EpisodeEffort(
@@ -118,6 +128,27 @@ def effort_numbers(episodes: Sequence[EpisodeEffort], body: Body) -> dict[str, A
         "per_joint": {joint: numbers_of(*(part[:, index] for part in parts)) for index, joint in enumerate(JOINTS)},
         "per_leg": {side: numbers_of(*(part[index] for part in parts)) for index, side in enumerate(SIDES)},
     }
+
+
+def stiffness_charge(recording: Recording, factor: float = 1.0) -> float:
+    """Return the mean of the reward term `stiffness` over all steps of a recording with the setting `ankle_tendon`.
+
+    `factor` is on `STIFFNESS_PER_TORQUE`: with 1 the mean is that of the recorded term. Devices are no muscles: where
+    one acts beside an ankle, its K counts here too. Raises `SpringfootError` without `ankle_tendon`.
+    """
+    settings = recording.settings
+    if settings.ankle_tendon is None:
+        raise SpringfootError("stiffness_charge needs a recording with ankle_tendon, got None")
+    scale = body_of(settings).stiffness_scale
+    every = round(settings.step_seconds / TICK)
+    at_ends = {name: values[:, every - 1 :: every].astype(float) for name, values in recording.series.items()}
+    angle = at_ends["angle"]
+    tissue = scale * ankle_tissue_stiffness(angle[..., KNEE], angle[..., ANKLE])
+    ankle, toe = np.moveaxis(at_ends["stiffness"], -1, 0)
+    torque = at_ends["fibre_moment"][..., ANKLE]
+    ankle = charged_calf_stiffness(ankle, tissue, torque, settings.ankle_tendon, scale, factor * STIFFNESS_PER_TORQUE)
+    squares = (ankle / ANKLE_STIFFNESS_UNIT) ** 2 + TOE_SHARE * (toe / TOE_STIFFNESS_UNIT) ** 2
+    return float(np.nanmean(squares) / (1.0 + TOE_SHARE) / scale**2)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

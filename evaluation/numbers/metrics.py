@@ -18,6 +18,7 @@ from springfoot.envs.settings.settings import DEFAULT_WEIGHTS, body_of, referenc
 from springfoot.envs.task.reward import TERMS
 from springfoot.gait.people import scores as score
 from springfoot.gait.people.gait_events import PERCENT
+from springfoot.gait.plan.effort import AS_IS, Muscle
 
 from ..recording.open_loop import feedback
 from ..recording.recording import REWARD, TICK, Recording
@@ -60,9 +61,12 @@ class Gait:
         return self.tally.com
 
 
-def measure(recording: Recording) -> Gait:
-    """Compute every number of metrics.json and the mean curves, from the recording alone."""
-    tally = tally_strides(recording)
+def measure(recording: Recording, muscle: Muscle = AS_IS) -> Gait:
+    """Compute every number of metrics.json and the mean curves, from the recording alone.
+
+    `muscle` has factors on properties of the muscles whose effort is told.
+    """
+    tally = tally_strides(recording, muscle)
     return Gait(metrics=_metrics(recording, tally), tally=tally)
 
 

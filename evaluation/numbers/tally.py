@@ -17,6 +17,7 @@ from springfoot.envs.task.reward import TERMS
 from springfoot.gait import GRAVITY
 from springfoot.gait.people import scores as score
 from springfoot.gait.people.gait_events import CONTACT_THRESHOLD_BW, Contacts, find_steps, next_after, on_percent
+from springfoot.gait.plan.effort import AS_IS, Muscle
 
 from ..recording.recording import REWARD, TICK, WARM_UP, Recording
 from .curves import StrideCurves
@@ -87,15 +88,18 @@ class StrideTally:
     """Least height of ball and toe in the middle of each swing [m]."""
 
 
-def tally_strides(recording: Recording) -> StrideTally:
-    """Tally every stride, step and episode of a recording: its steady walk, without the warm-up."""
+def tally_strides(recording: Recording, muscle: Muscle = AS_IS) -> StrideTally:
+    """Tally every stride, step and episode of a recording: its steady walk, without the warm-up.
+
+    `muscle` has factors on properties of the muscles whose effort is tallied.
+    """
     tally = StrideTally()
     fell = recording.fall_reason != ""
     begin, end = steady_walk(recording.settings)
     for episode, ticks in enumerate(recording.ticks):
         series = {name: values[episode, :ticks].astype(float) for name, values in recording.series.items()}
         if ticks:
-            add_episode(tally, series, recording.settings, (begin + WARM_UP, end), bool(fell[episode]))
+            add_episode(tally, series, recording.settings, (begin + WARM_UP, end), bool(fell[episode]), muscle)
             tally.at_rest += not fell[episode] and score.at_rest(
                 series["com"], *series["ankle"].swapaxes(0, 1), tick=TICK
             )
@@ -108,6 +112,7 @@ def add_episode(
     settings: BipedSettings,
     steady: tuple[float, float],
     fell: bool = False,
+    muscle: Muscle = AS_IS,
 ) -> None:
     """Add the strides and steps of one episode to a tally.
 
@@ -117,6 +122,7 @@ def add_episode(
         settings: of the environment: body, feet and slope.
         steady: from and to [s]; strides and steps outside this time do not count.
         fell: whether the episode ended in a fall.
+        muscle: factors on properties of the muscles.
     """
     body = body_of(settings)
     weight = body.mass * GRAVITY  # [N]
@@ -130,7 +136,7 @@ def add_episode(
         tally.work += float(series["joint_work"][first_tick:last_tick, ..., 0].sum())  # 0: the positive part
         if seconds >= SHORTEST_SPEED:
             tally.speed.append(distance / seconds)
-        if effort := episode_effort(series, body, settings.feet, first_tick, last_tick):
+        if effort := episode_effort(series, body, settings.feet, first_tick, last_tick, muscle):
             tally.effort.append(effort)
 
     # Curves and numbers of each foot's strides, cut at its heel strikes.

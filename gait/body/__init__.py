@@ -6,14 +6,15 @@ from springfoot.lazy import lazy_names
 
 if TYPE_CHECKING:
     from .body import GRAVITY, HEEL_RADIUS, REFERENCE_HEIGHT, REFERENCE_MASS, Body
-    from .tissue import TOE_STIFFNESS
+    from .tissue import ANKLE_TENDON, TOE_STIFFNESS
 
-__all__ = ["GRAVITY", "HEEL_RADIUS", "REFERENCE_HEIGHT", "REFERENCE_MASS", "TOE_STIFFNESS", "Body"]
+__all__ = ["ANKLE_TENDON", "GRAVITY", "HEEL_RADIUS", "REFERENCE_HEIGHT", "REFERENCE_MASS", "TOE_STIFFNESS", "Body"]
 
 if not TYPE_CHECKING:  # a type checker would take it to mean that any name exists
     __getattr__ = lazy_names(
         __name__,
         {
+            "ANKLE_TENDON": "tissue",
             "GRAVITY": "body",
             "HEEL_RADIUS": "body",
             "REFERENCE_HEIGHT": "body",

@@ -81,9 +81,22 @@ def ankle_tissue_stiffness(knee: Any, ankle: Any) -> Any:
     return _PER_RADIAN * (rising + 0.1949 * np.exp(-7.9763 - 0.1949 * ankle + 0.0008 * knee))
 
 
-def muscle_in_series(stiffness: Any, tendon: Any) -> Any:
-    """Return K K_t / (K_t - K) [N m/rad]: the stiffness of a muscle that has the given one together with its tendon.
+def charged_calf_stiffness(
+    stiffness: Any, tissue: Any, torque: Any, tendon: float, scale: float, per_torque: float = STIFFNESS_PER_TORQUE
+) -> Any:
+    """Return the calf's own K beyond that of a relaxed calf and what its torque brings [N m/rad], at least 0.
 
-    The `tendon` in series is the stiffer one.
+    The calf is in series with its tendon, and both are beside passive tissue. Arguments are numbers, as in kernels, or
+    arrays.
+
+    Args:
+        stiffness, tissue: K of the whole ankle, and of its tissue [N m/rad].
+        torque: of the calf [N m].
+        tendon: stiffness of the tendon at 1.70 m and 63 kg [N m/rad].
+        scale: of stiffness, `Body.stiffness_scale`.
+        per_torque: rise of the calf's stiffness with its torque [1/rad].
     """
-    return stiffness * tendon / (tendon - stiffness)
+    # Calf and tendon alone: K may be below the tissue's, and the angles have moved on since it was bounded.
+    together = np.minimum(np.maximum(stiffness - tissue, 0.0), TENDON_SHARE * scale * tendon)
+    own = together * (scale * tendon) / (scale * tendon - together)
+    return np.maximum(own - scale * RELAXED_STIFFNESS - per_torque * np.abs(torque), 0.0)

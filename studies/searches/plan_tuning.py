@@ -172,6 +172,8 @@ class PlanTuning(Study):
     """Factor on passive moments of tissue."""
     tendon: float = 1.0
     """Factor on the give of the Achilles tendon."""
+    toe_tendon: float = 1.0
+    """Factor on the give of the toes' tendons."""
     start: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = None
     """File of styles to begin at, in place of round numbers."""
     styles: Annotated[Path, tyro.conf.arg(metavar="FILE")] = STYLES
@@ -187,7 +189,7 @@ class PlanTuning(Study):
         for count, least in (("generations", 1), ("population", 4), ("seed", 0)):
             require_count(count, getattr(self, count), least)
         require_number("sigma", self.sigma, 0, above=True)
-        for name in ("tissue", "tendon"):
+        for name in ("tissue", "tendon", "toe_tendon"):
             require_number(name, getattr(self, name), 0)
         for weight in self.weights:
             require_number("weights", weight, 0)
@@ -231,7 +233,7 @@ class PlanTuning(Study):
 
     def _price(self, body: Body, vector: NDArray) -> tuple[float, WalkPlan | None, Effort | None]:
         """Return cost, plan and effort at a vector, by the flags (see `price`)."""
-        muscle = Muscle(tissue=self.tissue, tendon=self.tendon)
+        muscle = Muscle(tissue=self.tissue, tendon=self.tendon, toe_tendon=self.toe_tendon)
         return price(body, self.speed, vector, self.weights, muscle)
 
     def _keep(self, style: WalkStyle) -> None:

@@ -15,7 +15,6 @@ from springfoot.gait.body.tissue import (
     STIFFNESS_PER_TORQUE,
     TENDON_SHARE,
     ankle_tissue_stiffness,
-    muscle_in_series,
 )
 
 
@@ -100,7 +99,8 @@ def test_the_reward_charges_the_calfs_own_k_beyond_what_its_torque_brings():
         for side, name in enumerate(SIDES):
             together = min(max(info[f"stiffness/ankle_{name}"] - tissue(biped)[0, side], 0.0), TENDON_SHARE * 400.0)
             torque = abs(biped._simulation.arrays.bodies["muscles"]["moment"][0, 0, side, ANKLE])
-            own = muscle_in_series(together, 400.0) - RELAXED_STIFFNESS - STIFFNESS_PER_TORQUE * torque
+            in_series = together * 400.0 / (400.0 - together)
+            own = in_series - RELAXED_STIFFNESS - STIFFNESS_PER_TORQUE * torque
             toe = info[f"stiffness/toe_{name}"]
             charged += 0.5 * ((max(own, 0.0) / 300.0) ** 2 + 0.25 * (toe / 60.0) ** 2) / 1.25
         assert info["reward/stiffness"] == pytest.approx(charged, rel=1e-12)

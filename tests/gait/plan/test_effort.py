@@ -6,7 +6,12 @@ import pytest
 from springfoot.gait import Body
 from springfoot.gait.body.body import GRAVITY
 from springfoot.gait.body.leg import JOINTS
-from springfoot.gait.body.tissue import ankle_tissue_stiffness, muscle_in_series, passive_moments
+from springfoot.gait.body.tissue import (
+    RELAXED_STIFFNESS,
+    ankle_tissue_stiffness,
+    charged_calf_stiffness,
+    passive_moments,
+)
 from springfoot.gait.plan.effort import (
     ACTIVATION_TIME,
     MUSCLE_EFFICIENCY,
@@ -105,6 +110,7 @@ def test_the_tissues_stiffness_is_the_slope_of_its_moment():
 
 
 def test_a_muscle_in_series_with_its_tendon_has_the_stiffness_of_both():
-    own = muscle_in_series(np.array([1.0, 200.0, 360.0]), 400.0)
-    np.testing.assert_allclose(1.0 / (1.0 / own + 1.0 / 400.0), [1.0, 200.0, 360.0], rtol=1e-12)
+    together = np.array([100.0, 200.0, 360.0])
+    own = charged_calf_stiffness(together + 50.0, 50.0, 0.0, 400.0, 1.0) + RELAXED_STIFFNESS
+    np.testing.assert_allclose(1.0 / (1.0 / own + 1.0 / 400.0), together, rtol=1e-12)
     assert own[2] == pytest.approx(9 * 400.0)
