@@ -67,6 +67,7 @@ STUDIES = {
         "Do the searches of all adapted feet find the same again? (searches for hours)",
     ),
     "controls": ("feet.controls.Controls", "Does the price of a walk hold where its answer is known?"),
+    "price": ("feet.price.Price", "How much does the price of a walk change with its tendons?"),
     "persons": ("feet.persons.Persons", "How do learned persons walk on drawn bodies and feet, and beside people?"),
     "prosthesis": ("feet.prosthesis.Prosthesis", "What are rigid, passive and adaptive feet worth to who wears them?"),
     "orthosis": ("feet.orthosis.Orthosis", "Which spring beside the ankle helps a weak calf, and which a drop foot?"),
