@@ -64,7 +64,6 @@ STUDIES = {
     "controls": ("feet.controls.Controls", "Does the price of a walk hold where its answer is known?"),
     "persons": ("feet.persons.Persons", "How do learned persons walk on drawn bodies and feet, and beside people?"),
     "orthosis": ("feet.orthosis.Orthosis", "Which spring beside the ankle helps a weak calf, and which a drop foot?"),
-    "slope-tuning": ("searches.slope_tuning.SlopeTuning", "What does a slope add to the legs' targets? (searches)"),
     "play": ("walks.play.Play", "What does a stiffness do to a walk? A recorded page to play with."),
 }
 """Name of each study on the command line -> its class, imported when asked for, and its question."""

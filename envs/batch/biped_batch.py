@@ -15,7 +15,7 @@ import numpy as np
 from springfoot.arrays import NDArray
 from springfoot.errors import SpringfootError
 
-from ..control.constants import LegConstants, SlopeConstants, slope_constants
+from ..control.constants import LegConstants, slope_constants
 from ..control.decision_times import DecisionTimes
 from ..control.equilibrium import foot_tables
 from ..control.legs import LegController, slope_table
@@ -58,7 +58,6 @@ class Biped(ExactState):
         variant: (N,) index into `legs` of each body's set.
         rest: (V, SAMPLES, 2) rest angles of the foot springs in place of the settings' [rad], one for each of `legs`.
         model: a custom model, as for `Simulation`.
-        slope: constants for slopes in place of the committed ones.
         feet: N pairs, the feet of each body in place of the settings' `left_foot` and `right_foot`.
         right_legs: V sets of constants for the right legs; phase, trunk and speed still follow `legs`.
     """
@@ -74,13 +73,12 @@ class Biped(ExactState):
         variant: NDArray | None = None,
         rest: NDArray | None = None,
         model: MjModel | None = None,
-        slope: SlopeConstants | None = None,
         feet: Sequence[Feet] | None = None,
         right_legs: Sequence[LegConstants] | None = None,
     ):
         # A copy of the batch is made of these arguments (`ExactState`).
         self._arguments = {"settings": settings, "num_envs": num_envs, "num_threads": num_threads, "legs": legs}
-        self._arguments |= {"variant": variant, "rest": rest, "model": model, "slope": slope, "feet": feet}
+        self._arguments |= {"variant": variant, "rest": rest, "model": model, "feet": feet}
         self._arguments["right_legs"] = right_legs
         self.settings = settings
         self.num_envs = num_envs
@@ -107,7 +105,7 @@ class Biped(ExactState):
         speeds = np.array([walk.speed for walk in self.walks])
         self.subjects = Subjects(settings, speeds, num_envs, variant, len(self.constants))
         self._worn = WornFeet(settings, feet or [settings.feet] * num_envs)
-        self._incline = slope_table(slope or slope_constants()).table
+        self._incline = slope_table(slope_constants()).table
         self._legs = LegController(table, self.subjects, right)
         planned, stiffness = foot_tables(settings, (*table, *right))
         # Tables have a row for each body, variant and speed, and as many again for right legs of their own.

@@ -9,11 +9,9 @@ if TYPE_CHECKING:
         KNOTS,
         TUNED_SPEED,
         LegConstants,
-        SlopeConstants,
         constants_from,
         constants_name,
         leg_constants,
-        slope_constants_from,
     )
     from .equilibrium import PLATEAUS, REFERENCE_STIFFNESS, TOE_OFF, foot_curves, plateau_curve
     from .person import HELD_BY_SOUND, person_constants
@@ -36,7 +34,6 @@ __all__ = [
     "TOE_OFF",
     "TUNED_SPEED",
     "LegConstants",
-    "SlopeConstants",
     "Subjects",
     "action_of",
     "constants_from",
@@ -46,7 +43,6 @@ __all__ = [
     "person_constants",
     "plateau_curve",
     "reference_walk_at",
-    "slope_constants_from",
     "stiffness_of",
     "stiffness_ranges",
     "tabulated_speeds",
@@ -68,7 +64,6 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
             "TOE_OFF": "equilibrium",
             "TUNED_SPEED": "constants",
             "LegConstants": "constants",
-            "SlopeConstants": "constants",
             "Subjects": "subjects",
             "action_of": "stiffness_control",
             "constants_from": "constants",
@@ -78,7 +73,6 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
             "person_constants": "person",
             "plateau_curve": "equilibrium",
             "reference_walk_at": "reference_walk",
-            "slope_constants_from": "constants",
             "stiffness_of": "stiffness_control",
             "stiffness_ranges": "stiffness_control",
             "tabulated_speeds": "reference_walk",

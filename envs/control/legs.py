@@ -1,9 +1,9 @@
 """Control the phase of the gait, and the hips and knees, which no action sets.
 
 Each hip and knee is a spring like the ankle (variable impedance) around the target's curves at the walking speed, with
-its moments fed forward. The stance hip also holds the trunk and the speed. A touchdown resets the phase. The constants
-of `legs.json` were found by `springfoot study leg-tuning`, those for slopes by `springfoot study slope-tuning` (command
-and seed stand in that file). Gains are for 1.70 m and 63 kg and scale with the body (see `envs.physics.model`).
+its moments fed forward. The stance hip also holds the trunk and the speed. A touchdown resets the phase. `legs.json`
+holds the constants, found by searches, and the command of each. Gains are for 1.70 m and 63 kg and scale with the body
+(see `envs.physics.model`).
 """
 
 from collections.abc import Sequence

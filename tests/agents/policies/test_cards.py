@@ -25,6 +25,6 @@ def test_each_loads_by_name_and_has_a_card(name):
 
 def test_another_name_has_no_card():
     with pytest.raises(
-        SpringfootError, match="no policy 'mine' in the package; there are pretrained, medium, predicted$"
+        SpringfootError, match=r"no policy 'mine' in the package; there are pretrained, medium, predicted$"
     ):
         policy_card("mine")
