@@ -14,7 +14,6 @@ if TYPE_CHECKING:
         leg_constants,
     )
     from .equilibrium import PLATEAUS, REFERENCE_STIFFNESS, TOE_OFF, foot_curves, plateau_curve
-    from .person import HELD_BY_SOUND, person_constants
     from .phase_table import GRID
     from .reference_walk import FED, reference_walk_at, tabulated_speeds
     from .standing import SLOW_SPEED
@@ -26,7 +25,6 @@ __all__ = [
     "FED",
     "FEET",
     "GRID",
-    "HELD_BY_SOUND",
     "KNOTS",
     "PLATEAUS",
     "REFERENCE_STIFFNESS",
@@ -40,7 +38,6 @@ __all__ = [
     "constants_name",
     "foot_curves",
     "leg_constants",
-    "person_constants",
     "plateau_curve",
     "reference_walk_at",
     "stiffness_of",
@@ -56,7 +53,6 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
             "FED": "reference_walk",
             "FEET": "stiffness_control",
             "GRID": "phase_table",
-            "HELD_BY_SOUND": "person",
             "KNOTS": "constants",
             "PLATEAUS": "equilibrium",
             "REFERENCE_STIFFNESS": "equilibrium",
@@ -70,7 +66,6 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
             "constants_name": "constants",
             "foot_curves": "equilibrium",
             "leg_constants": "constants",
-            "person_constants": "person",
             "plateau_curve": "equilibrium",
             "reference_walk_at": "reference_walk",
             "stiffness_of": "stiffness_control",

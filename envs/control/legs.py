@@ -123,7 +123,7 @@ def drive(rows, bodies, control, table, incline) -> None:
         torque = subject.scale.torque
         offset = rows[i].person.offset
         for side in range(2):
-            read(table[side * legs.right :], subject.place, legs.phase[side], curves[side])
+            read(table, subject.place, legs.phase[side], curves[side])
         legs.planned_speed = curves[LEFT, PLANNED_SPEED]
         too_fast = _too_fast(m, rows[i])
         # A stance hip holds trunk and speed by a torque; a swing hip's target shifts, so that the foot lands elsewhere.
@@ -191,20 +191,12 @@ class LegController:
     Args:
         rows: leg constants and walk of each row of the tables (`envs.control.reference_walk.rows`).
         subjects: bodies and commanded speeds.
-        right: the same for the right leg, if it has constants of its own; phase, trunk and speed are held by the
-            constants of `rows`.
     """
 
-    def __init__(
-        self,
-        rows: Sequence[tuple[LegConstants, ReferenceWalk]],
-        subjects: Subjects,
-        right: Sequence[tuple[LegConstants, ReferenceWalk]] = (),
-    ):
+    def __init__(self, rows: Sequence[tuple[LegConstants, ReferenceWalk]], subjects: Subjects):
         self._subjects = subjects
         self._constants = np.array([_gains(c, walk) for c, walk in rows], GAINS)
-        self.table = PhaseTable(np.stack([leg_curves(c, walk) for c, walk in (*rows, *right)]))
-        subjects.rows["legs"]["right"] = len(rows) if right else 0  # rows from a left leg's curves to the right one's
+        self.table = PhaseTable(np.stack([leg_curves(c, walk) for c, walk in rows]))
         self.phase = subjects.rows["legs"]["phase"]
         """(N, side) phase of each leg's stride in [0, 1), 0 at its heel strike; changed in place."""
         self.phase[:] = leg_phases(np.zeros(len(self.phase)))
