@@ -10,7 +10,7 @@ export OMP_NUM_THREADS ?= 1
 # On every core, neighbours together as long as no core is idle: what the tests of a file share is made once or twice.
 PYTEST := $(BIN)/python -m pytest --numprocesses auto --dist worksteal
 
-.PHONY: help install walk predict test test-all test-wheel test-sdist test-lowest notebooks licences test-learners test-rllib test-kills fuzz extremes mutants check format bench feet docs lock clean
+.PHONY: help install walk predict test test-all test-wheel test-sdist test-lowest notebooks licences test-learners test-rllib test-kills fuzz extremes mutants check format bench docs lock clean
 
 help:
 	@echo "make walk     train with the defaults, then evaluate what was trained (results in runs/)"
@@ -31,7 +31,6 @@ help:
 	@echo "make docs     build the site in build/site; a warning is an error"
 	@echo "make format   apply the format and the lint fixes"
 	@echo "make bench    cost of a step against MuJoCo's own, and of training; figures in build/bench.json"
-	@echo "make feet     what feet are worth, from committed people and policies; goes on after a stop; FULL=1: searches, trains"
 	@echo "make install  only $(VENV), from requirements.lock; the others do it by themselves"
 	@echo "make lock     requirements.lock anew: the versions of constraints.txt with the hash of every file"
 	@echo "make predict  a walk from nothing: plan, leg constants, policy; goes on after a stop"
@@ -182,14 +181,6 @@ $(VENV)/docs: pyproject.toml constraints.txt | $(VENV)/installed
 format: install
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
-
-# What is measured, searched for and trained is kept in runs/feet: after a stop the same command goes on.
-FEET := $(BIN)/springfoot study
-feet: install
-	@set -ex; \
-	if [ -n "$(FULL)" ]; then $(FEET) adapt-all; cp runs/feet/adapted.json envs/control/adapted.json; fi; \
-	$(FEET) prosthesis $(if $(FULL),--train --policies agents/pretrained/feet) --keep runs/feet/prosthesis.json; \
-	$(FEET) orthosis --keep runs/feet/orthosis.json
 
 # Each stage is kept in runs/predict: after a stop the same command goes on.
 predict: install

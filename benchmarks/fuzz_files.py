@@ -35,7 +35,7 @@ from springfoot.gait.springs.foot_file import read_foot
 from springfoot.studies.base.flags import read_json
 from springfoot.studies.base.kept import Kept
 from springfoot.studies.searches.cma_search import generations
-from springfoot.studies.searches.constants_file import ADAPTED_FEET, CONSTANTS, read_constants, read_feet, read_styles
+from springfoot.studies.searches.constants_file import CONSTANTS, read_constants, read_styles
 from springfoot.studies.walks.learning_curves import read_finished
 
 TASK = BipedSettings()
@@ -86,7 +86,6 @@ def readers(folder: Path) -> dict[str, Reader]:
         "people's curves": Reader(read=_curves(folder), suffix=".csv", bases=(_reference_table(folder),)),
         "plan": Reader(read=_plan, suffix=".json", bases=(_plan_file(),)),
         "leg constants": Reader(read=_constants, suffix=".json", bases=(CONSTANTS.read_bytes(),)),
-        "adapted feet": Reader(read=_adapted, suffix=".json", bases=(ADAPTED_FEET.read_bytes(),)),
         "styles of a search": Reader(read=_styles, suffix=".json", bases=(STYLES.read_bytes(),)),
         "costs of a search": Reader(read=_search, suffix=".json", bases=(_searched(folder),)),
         "numbers of a study": Reader(read=Kept, suffix=".json", bases=(b'{"[1, \\"a\\"]": {"falls": 0.0}}',)),
@@ -327,10 +326,6 @@ def _plan(path: Path) -> None:
 def _constants(path: Path) -> None:
     for values in read_constants(path)["constants"].values():
         constants_from(values)
-
-
-def _adapted(path: Path) -> None:
-    settings_from(right_foot={"kind": "passive", "adapted": next(iter(read_feet(path)["feet"].values()))["adapted"]})
 
 
 def _styles(path: Path) -> None:

@@ -61,17 +61,10 @@ STUDIES = {
     "plan-tuning": ("searches.plan_tuning.PlanTuning", "Which plan of a walk costs least effort? (searches)"),
     "predict": ("searches.predict.Predict", "Which walk follows from body, plan and physics alone? (searches, trains)"),
     "leg-sets": ("searches.leg_sets.LegSets", "Do independent searches for leg constants find the same walk?"),
-    "adapt": ("feet.adapt.Adapt", "How does a person walk who has adapted to a foot? (searches for minutes)"),
-    "adapt-all": (
-        "feet.adapt_all.AdaptAll",
-        "Do the searches of all adapted feet find the same again? (searches for hours)",
-    ),
     "controls": ("feet.controls.Controls", "Does the price of a walk hold where its answer is known?"),
     "price": ("feet.price.Price", "How much does the price of a walk change with its tendons?"),
     "persons": ("feet.persons.Persons", "How do learned persons walk on drawn bodies and feet, and beside people?"),
-    "prosthesis": ("feet.prosthesis.Prosthesis", "What are rigid, passive and adaptive feet worth to who wears them?"),
     "orthosis": ("feet.orthosis.Orthosis", "Which spring beside the ankle helps a weak calf, and which a drop foot?"),
-    "slope-tuning": ("searches.slope_tuning.SlopeTuning", "What does a slope add to the legs' targets? (searches)"),
     "play": ("walks.play.Play", "What does a stiffness do to a walk? A recorded page to play with."),
 }
 """Name of each study on the command line -> its class, imported when asked for, and its question."""

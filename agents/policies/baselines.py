@@ -5,7 +5,7 @@ a stiffness in N m/rad into an action by the inverse of the environment's log sc
 `action_mode="absolute"`.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from math import inf, nan
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from springfoot.arrays import NDArray
 from springfoot.envs.control.equilibrium import REFERENCE_STIFFNESS, fixed_stiffness, plateau_curve
 from springfoot.envs.control.phase_table import GRID, PLACE, PhaseTable, leg_phases
-from springfoot.envs.control.reference_walk import ReferenceWalk, tabulated_speeds, walks_of_legs
+from springfoot.envs.control.reference_walk import reference_walks, tabulated_speeds
 from springfoot.envs.control.stiffness_control import action_of
 from springfoot.envs.physics.model import ACTIONS, SIDES
 from springfoot.envs.settings.settings import BipedSettings, body_of
@@ -71,25 +71,16 @@ def schedule(settings: BipedSettings, factor: float = 1.0) -> PolicyFunction:
     """Return the policy of a stiffness schedule times `factor`: `settings.schedule`, else the schedule that was tuned
     with the leg constants.
 
-    The tuned schedule depends on the momentary commanded speed, and differs between the legs of a person who has
-    adapted to a foot. Both schedules scale with the body.
+    The tuned schedule depends on the momentary commanded speed. Both schedules scale with the body.
     """
     body = body_of(settings)
     speeds = tabulated_speeds(settings)
     if settings.schedule is not None:
         stiffness, _ = settings.schedule.at(GRID)  # without the rest angles, which are the environment's
         return follow(factor * stiffness[None], speeds[:1], settings, body)  # one speed: the same at all
-    left, right = walks_of_legs(settings)  # `right` is empty if the legs do not differ
-    stiffness = np.stack([_tuned_schedules(left), _tuned_schedules(right)], 2) if right else _tuned_schedules(left)
-    return follow(factor * stiffness, speeds, settings, body)
-
-
-def _tuned_schedules(walks: Sequence[ReferenceWalk]) -> NDArray:
-    """Return the stiffness schedules of one leg's constants (speeds, samples, (ankle, toe)) [N m/rad].
-
-    `walks` are that leg's reference walks, one for each speed; of several variants of constants the first counts.
-    """
-    return np.stack([fixed_stiffness(walk.constants[0], walk.body, walk.target.foot.plateaus) for walk in walks])
+    walks = reference_walks(settings)  # one for each speed
+    tuned = [fixed_stiffness(walk.constants[0], walk.body, walk.target.foot.plateaus) for walk in walks]
+    return follow(factor * np.stack(tuned), speeds, settings, body)
 
 
 def quasi_stiffness(settings: BipedSettings) -> PolicyFunction:

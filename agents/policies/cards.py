@@ -32,7 +32,7 @@ def policy_card(name: str) -> str:
             f"no policy {name!r} in the package; there are {', '.join(SHIPPED)}{perhaps(name, SHIPPED)}"
         )
     policy = read_policy(name)
-    purpose, command, page = MADE.get(name) or _of_a_foot(name)
+    purpose, command, page = MADE[name]
     defaults = settings_to_json(BipedSettings())
     changed = {key: value for key, value in settings_to_json(policy.settings).items() if value != defaults[key]}
     layers = " - ".join(map(str, policy.layer_sizes))
@@ -47,10 +47,3 @@ def policy_card(name: str) -> str:
         f"SHA-256: `{sha256(read_bytes(find_policy(name))).hexdigest()}`",
     ]
     return "\n- ".join([f"**{name}.** {purpose}\n", *lines])
-
-
-def _of_a_foot(name: str) -> tuple[str, str, str]:
-    """Return purpose, command and page (as in `MADE`) of a policy KIND-SEARCH-SEED, one of `OF_FEET`."""
-    kind, search, seed = name.split("-")
-    purpose = f"Walks with a {kind} right foot, found by search {search}, to which the person has adapted; seed {seed}."
-    return purpose, "springfoot study prosthesis --train --policies FOLDER", "feet"

@@ -4,7 +4,6 @@ The contract describes inputs and outputs: names, units, order and bounds. Neith
 """
 
 import json
-from collections.abc import Sequence
 from importlib.metadata import version
 from math import e
 from pathlib import Path
@@ -17,7 +16,7 @@ from springfoot.arrays import NDArray
 from springfoot.envs.control.equilibrium import foot_curves
 from springfoot.envs.control.foot_rows import controlled_joints
 from springfoot.envs.control.phase_table import SAMPLES
-from springfoot.envs.control.reference_walk import ReferenceWalk, rows, walks_of_legs
+from springfoot.envs.control.reference_walk import reference_walks, rows
 from springfoot.envs.control.stiffness_control import stiffness_of
 from springfoot.envs.physics.model import ACTIONS, SIDES
 from springfoot.envs.settings.settings import BipedSettings, body_of
@@ -169,23 +168,21 @@ def _schedule(settings: BipedSettings) -> dict[str, Any]:
     """Return the schedule that a residual action multiplies, as JSON values: K for each speed at each percent of the
     leg's stride.
 
-    K is that of the contract's body, 1.70 m and 63 kg. For a person who has adapted to a foot, `right` holds the right
-    leg's schedule, and the other entries are the left leg's.
+    K is that of the contract's body, 1.70 m and 63 kg.
     """
-    left, right = walks_of_legs(settings)
-    schedule = {"unit": "N m/rad", "speed_m_s": [float(walk.speed) for walk in left], **_curves(settings, left)}
-    return schedule | {"right": _curves(settings, right)} if right else schedule
-
-
-def _curves(settings: BipedSettings, walks: Sequence[ReferenceWalk]) -> dict[str, list[list[float]]]:
-    """Return `ankle` and `toe` K as lists [speed][percent of the stride] [N m/rad], of the body of 1.70 m and 63 kg."""
+    walks = reference_walks(settings)
     scale = body_of(settings).stiffness_scale
     curves = []
     for constants, walk in rows(walks):
         _, stiffness = foot_curves(settings, constants, walk)
         curves.append(stiffness[::SCHEDULE_STEP] / scale)
     table = np.round(np.stack(curves), 6)  # (speed, percent, joint), without the last bits' noise
-    return {"ankle": table[..., 0].tolist(), "toe": table[..., 1].tolist()}
+    return {
+        "unit": "N m/rad",
+        "speed_m_s": [float(walk.speed) for walk in walks],
+        "ankle": table[..., 0].tolist(),
+        "toe": table[..., 1].tolist(),
+    }
 
 
 OPSET, IR_VERSION = 17, 8

@@ -37,7 +37,7 @@ def fingerprint(biped: Biped) -> dict[str, str]:
     model = biped.model
     actions = np.array([[-1.0, -1.0], [0.0, 0.0], [1.0, 1.0]])  # of ankle and toe: softest, middle, stiffest
     of_legs: list[Any] = []
-    for constants, walk in (*rows(biped.walks), *rows(biped.right_walks)):
+    for constants, walk in rows(biped.walks):
         columns = slice(None) if constants.swing_place_gain else slice(PLANNED_PLACE)  # from there the CoM's position
         curves = (leg_curves(constants, walk)[:, columns], *foot_curves(biped.settings, constants, walk))
         of_legs += [*_digested_constants(constants).values(), *(curve[::_EVERY] for curve in curves)]

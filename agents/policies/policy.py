@@ -46,11 +46,7 @@ Output = Literal["clip", "tanh"]
 
 BEST, LAST = "best.safetensors", "last.safetensors"
 """Names of a run folder's policies: the one with the highest return in periodic evaluation, and the newest."""
-OF_FEET = tuple(f"{kind}-{search}-{seed}" for kind in ("passive", "adaptive") for search in (1, 2) for seed in range(5))
-"""Policies trained on prosthetic feet: KIND-SEARCH-SEED, of `springfoot study prosthesis`."""
-SHIPPED = {"pretrained": "walk.safetensors", "medium": "medium.safetensors", "predicted": "predicted.safetensors"} | {
-    name: f"feet/{name}.safetensors" for name in OF_FEET
-}
+SHIPPED = {"pretrained": "walk.safetensors", "medium": "medium.safetensors", "predicted": "predicted.safetensors"}
 """Name of a policy of this package -> its file in `pretrained/`; `policy_card` describes each."""
 PRETRAINED_BY = "python train.py --push-newton 250 --timesteps 14000000 --out runs/pretrained"
 """Command that made `pretrained` from nothing."""

@@ -15,12 +15,12 @@ import numpy as np
 from springfoot.arrays import NDArray
 from springfoot.errors import SpringfootError
 
-from ..control.constants import LegConstants, SlopeConstants, slope_constants
+from ..control.constants import LegConstants, slope_constants
 from ..control.decision_times import DecisionTimes
 from ..control.equilibrium import foot_tables
 from ..control.legs import LegController, slope_table
 from ..control.person_actions import PersonActions
-from ..control.reference_walk import rows, walks_of_legs
+from ..control.reference_walk import reference_walks, rows
 from ..control.standing import WALKING, Standing, off_phase
 from ..control.stiffness_control import FootSprings, draw_delay
 from ..control.subjects import Subjects
@@ -58,9 +58,7 @@ class Biped(ExactState):
         variant: (N,) index into `legs` of each body's set.
         rest: (V, SAMPLES, 2) rest angles of the foot springs in place of the settings' [rad], one for each of `legs`.
         model: a custom model, as for `Simulation`.
-        slope: constants for slopes in place of the committed ones.
         feet: N pairs, the feet of each body in place of the settings' `left_foot` and `right_foot`.
-        right_legs: V sets of constants for the right legs; phase, trunk and speed still follow `legs`.
     """
 
     tick_dt = CONTROL_WINDOW
@@ -74,14 +72,11 @@ class Biped(ExactState):
         variant: NDArray | None = None,
         rest: NDArray | None = None,
         model: MjModel | None = None,
-        slope: SlopeConstants | None = None,
         feet: Sequence[Feet] | None = None,
-        right_legs: Sequence[LegConstants] | None = None,
     ):
         # A copy of the batch is made of these arguments (`ExactState`).
         self._arguments = {"settings": settings, "num_envs": num_envs, "num_threads": num_threads, "legs": legs}
-        self._arguments |= {"variant": variant, "rest": rest, "model": model, "slope": slope, "feet": feet}
-        self._arguments["right_legs"] = right_legs
+        self._arguments |= {"variant": variant, "rest": rest, "model": model, "feet": feet}
         self.settings = settings
         self.num_envs = num_envs
         self.dt = settings.step_seconds
@@ -93,26 +88,24 @@ class Biped(ExactState):
         self._acts_as_person = settings.acts != "stiffness"
         self.action_names = ACTIONS * self._acts_on_stiffness + PERSON_ACTIONS * self._acts_as_person
         """Name of each action, those of the stiffness first."""
-        walks = [walks_of_legs(of_body, legs, right_legs) for of_body in settings_of_bodies(settings)]
-        self.walks, self.right_walks = walks[0]
-        """Reference walks of the left legs at each tabulated speed; those of the right legs, none if they are the same.
-        They, and all that follows from them here, are of the settings' body, or of the first of `drawn_bodies`."""
+        walks = [reference_walks(of_body, legs) for of_body in settings_of_bodies(settings)]
+        self.walks = walks[0]
+        """Reference walks at each tabulated speed. They, and all that follows from them here, are of the settings'
+        body, or of the first of `drawn_bodies`."""
         walk_at_speed = next(walk for walk in self.walks if walk.speed == settings.speed)
         self.body = walk_at_speed.body
         self.target = walk_at_speed.target
         self.plan = walk_at_speed.plan
         self.constants = walk_at_speed.constants
-        table = [row for of_body, _ in walks for row in rows(of_body)]
-        right = [row for _, of_body in walks for row in rows(of_body)]
+        table = [row for of_body in walks for row in rows(of_body)]
         speeds = np.array([walk.speed for walk in self.walks])
         self.subjects = Subjects(settings, speeds, num_envs, variant, len(self.constants))
         self._worn = WornFeet(settings, feet or [settings.feet] * num_envs)
-        self._incline = slope_table(slope or slope_constants()).table
-        self._legs = LegController(table, self.subjects, right)
-        planned, stiffness = foot_tables(settings, (*table, *right))
-        # Tables have a row for each body, variant and speed, and as many again for right legs of their own.
-        tables = len(walks) * (2 if right else 1)
-        rest = planned if rest is None else np.tile(np.repeat(rest, len(speeds), axis=0), (tables, 1, 1))
+        self._incline = slope_table(slope_constants()).table
+        self._legs = LegController(table, self.subjects)
+        planned, stiffness = foot_tables(settings, table)
+        # Tables have a row for each body, variant and speed.
+        rest = planned if rest is None else np.tile(np.repeat(rest, len(speeds), axis=0), (len(walks), 1, 1))
         self._springs = FootSprings(settings, rest, stiffness, self.subjects, self._worn)
         self._decisions = DecisionTimes(settings, self.target, self.subjects.rows)
         self._start = start_table(table)

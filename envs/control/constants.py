@@ -178,12 +178,7 @@ def constants_from(values: Mapping[str, Any]) -> LegConstants:
 
 def slope_constants() -> SlopeConstants:
     """Return the committed constants for slopes."""
-    return slope_constants_from(_file()["slope"]["constants"])
-
-
-def slope_constants_from(values: Mapping[str, Any]) -> SlopeConstants:
-    """Return `SlopeConstants` from its JSON form (lists for tuples); raise `SpringfootError` for any other value."""
-    return _from_json(SlopeConstants, values)
+    return _from_json(SlopeConstants, _file()["slope"]["constants"])
 
 
 def _from_json(kind: type[Constants], values: Any) -> Constants:

@@ -1,9 +1,9 @@
 """Control the phase of the gait, and the hips and knees, which no action sets.
 
 Each hip and knee is a spring like the ankle (variable impedance) around the target's curves at the walking speed, with
-its moments fed forward. The stance hip also holds the trunk and the speed. A touchdown resets the phase. The constants
-of `legs.json` were found by `springfoot study leg-tuning`, those for slopes by `springfoot study slope-tuning` (command
-and seed stand in that file). Gains are for 1.70 m and 63 kg and scale with the body (see `envs.physics.model`).
+its moments fed forward. The stance hip also holds the trunk and the speed. A touchdown resets the phase. `legs.json`
+holds the constants, found by searches, and the command of each. Gains are for 1.70 m and 63 kg and scale with the body
+(see `envs.physics.model`).
 """
 
 from collections.abc import Sequence
@@ -123,7 +123,7 @@ def drive(rows, bodies, control, table, incline) -> None:
         torque = subject.scale.torque
         offset = rows[i].person.offset
         for side in range(2):
-            read(table[side * legs.right :], subject.place, legs.phase[side], curves[side])
+            read(table, subject.place, legs.phase[side], curves[side])
         legs.planned_speed = curves[LEFT, PLANNED_SPEED]
         too_fast = _too_fast(m, rows[i])
         # A stance hip holds trunk and speed by a torque; a swing hip's target shifts, so that the foot lands elsewhere.
@@ -191,20 +191,12 @@ class LegController:
     Args:
         rows: leg constants and walk of each row of the tables (`envs.control.reference_walk.rows`).
         subjects: bodies and commanded speeds.
-        right: the same for the right leg, if it has constants of its own; phase, trunk and speed are held by the
-            constants of `rows`.
     """
 
-    def __init__(
-        self,
-        rows: Sequence[tuple[LegConstants, ReferenceWalk]],
-        subjects: Subjects,
-        right: Sequence[tuple[LegConstants, ReferenceWalk]] = (),
-    ):
+    def __init__(self, rows: Sequence[tuple[LegConstants, ReferenceWalk]], subjects: Subjects):
         self._subjects = subjects
         self._constants = np.array([_gains(c, walk) for c, walk in rows], GAINS)
-        self.table = PhaseTable(np.stack([leg_curves(c, walk) for c, walk in (*rows, *right)]))
-        subjects.rows["legs"]["right"] = len(rows) if right else 0  # rows from a left leg's curves to the right one's
+        self.table = PhaseTable(np.stack([leg_curves(c, walk) for c, walk in rows]))
         self.phase = subjects.rows["legs"]["phase"]
         """(N, side) phase of each leg's stride in [0, 1), 0 at its heel strike; changed in place."""
         self.phase[:] = leg_phases(np.zeros(len(self.phase)))

@@ -22,10 +22,8 @@ from springfoot.gait.plan.plan import PLAN_SPEED_RANGE, Cadence, WalkPlan, plan_
 from springfoot.gait.plan.plan_gait import gait_of
 from springfoot.gait.plan.walk_style import least_work
 
-from ..physics.model import LEFT, RIGHT
 from ..settings.settings import BipedSettings, body_of, plan_file_of, reference_gait
-from .constants import LegConstants
-from .person import adapted_foot, person_constants
+from .constants import LegConstants, leg_constants
 from .phase_table import GRID
 from .standing import SLOW_SPEED
 
@@ -58,39 +56,23 @@ class ReferenceWalk:
     """(SAMPLES, 3) moments of hip, knee and ankle to feed forward [N m], extension and plantarflexion positive."""
 
 
-def walks_of_legs(
-    settings: BipedSettings, left: Sequence[LegConstants] | None = None, right: Sequence[LegConstants] | None = None
-) -> tuple[tuple[ReferenceWalk, ...], tuple[ReferenceWalk, ...]]:
-    """Return the reference walks of the left leg and of the right leg, each as `reference_walks`.
-
-    Those of the right leg are none if the legs do not differ.
-
-    `left` and `right` are leg constants in place of the committed ones.
-    """
-    legs_differ = right or (left is None and adapted_foot(settings))
-    return reference_walks(settings, left), reference_walks(settings, right, RIGHT) if legs_differ else ()
-
-
-def reference_walks(
-    settings: BipedSettings, legs: Sequence[LegConstants] | None = None, side: int = LEFT
-) -> tuple[ReferenceWalk, ...]:
-    """Return the walks of the settings' body at `tabulated_speeds`, slowest first, with the constants of the leg of
-    `side`.
+def reference_walks(settings: BipedSettings, legs: Sequence[LegConstants] | None = None) -> tuple[ReferenceWalk, ...]:
+    """Return the walks of the settings' body at `tabulated_speeds`, slowest first.
 
     `legs` are leg constants in place of the committed ones, the same at every speed. Raises `SpringfootError` for a
     walk that cannot be planned.
     """
-    return tuple(reference_walk_at(settings, float(speed), legs, side) for speed in tabulated_speeds(settings))
+    return tuple(reference_walk_at(settings, float(speed), legs) for speed in tabulated_speeds(settings))
 
 
 def reference_walk_at(
-    settings: BipedSettings, speed: float, legs: Sequence[LegConstants] | None = None, side: int = LEFT
+    settings: BipedSettings, speed: float, legs: Sequence[LegConstants] | None = None
 ) -> ReferenceWalk:
-    """Return the walk of the settings' body at `speed` [m/s]; `legs` and `side` as for `reference_walks`."""
+    """Return the walk of the settings' body at `speed` [m/s]; `legs` as for `reference_walks`."""
     body = body_of(settings)
     people = reference_gait(settings, speed)
     equal_speed = speed / sqrt(body.length_scale)
-    legs = legs or [person_constants(settings, equal_speed, side)]
+    legs = legs or [_committed(settings, equal_speed)]
     if settings.follows_plan:
         style = least_work(equal_speed, plan_file_of(settings))
         plan = plan_walk(body, speed, settings.cadence, human=people, style=style)
@@ -109,6 +91,12 @@ def reference_walk_at(
         constants=tuple(legs),
         moments=_plans_moments(plan) if settings.feedforward == "plan" else _moments_of(people, body),
     )
+
+
+def _committed(settings: BipedSettings, speed: float) -> LegConstants:
+    """Return the tuned constants for the settings at `speed` [m/s at 1.70 m]."""
+    named_by = settings.equilibrium, settings.cadence, speed, settings.feedforward, settings.follows_plan
+    return leg_constants(*named_by, plan_file_of(settings))
 
 
 def _moments_of(gait: HumanGait, body: Body) -> NDArray:

@@ -99,7 +99,6 @@ GAINS = np.dtype(
 LEGS = np.dtype(
     [
         ("gains", GAINS),
-        ("right", np.int64),  # rows by which the right leg's curves lie behind the left one's in the tables
         ("phase", float, len(SIDES)),  # of each leg's stride in [0, 1), 0 at its heel strike
         ("planned_speed", float),  # the planned CoM's forward speed over its mean, as the window began [-]
     ]

@@ -101,8 +101,7 @@ def stiffen(rows, bodies, schedule, options, factor, walking, fixed) -> None:
         subject = rows[i].subject
         angle = bodies[i].measured.angle
         for side in range(2):
-            # The rows of the right leg lie `legs.right` rows behind those of the left one.
-            read(schedule[side * rows[i].legs.right :], subject.place, rows[i].legs.phase[side], scheduled)
+            read(schedule, subject.place, rows[i].legs.phase[side], scheduled)
             springs.rest_phase[side] = rows[i].legs.phase[side]
             for joint in range(2):
                 springs.work_stiffness[side, joint] = springs.work_equilibrium[side, joint] = 0.0
@@ -235,7 +234,7 @@ def move(rows, bodies, control, rest, incline, feet, options, walking) -> None:
         for side in range(2):
             if not option.held:
                 springs.rest_phase[side] = rows[i].legs.phase[side]
-            read(rest[side * rows[i].legs.right :], subject.place, springs.rest_phase[side], planned)
+            read(rest, subject.place, springs.rest_phase[side], planned)
             if option.follows and subject.slope != 0.0:
                 read(incline, first_row, springs.rest_phase[side], inclined)
                 planned[0] += subject.slope * inclined[ANKLE]
@@ -380,11 +379,8 @@ class FootSprings:
 
     def scheduled(self, leg_phase: NDArray) -> NDArray:
         """Return the fixed stiffness of ankle and toe (N, side, 2) [N m/rad] at the phases `leg_phase` (N, side)."""
-        right = self._subjects.place.copy()
-        right["row"] += self._subjects.rows["legs"]["right"]  # the right leg's rows lie behind the left one's
-        places = zip(np.moveaxis(leg_phase, -1, 0), (self._subjects.place, right), strict=True)
-        curves = [self.schedule.at(np.ascontiguousarray(phase), place) for phase, place in places]
-        return np.stack(curves, 1) * self._subjects.scale["torque"][:, None, None]
+        curves = self.schedule.at(leg_phase, self._subjects.place)
+        return curves * self._subjects.scale["torque"][:, None, None]
 
     def factor(self, action: NDArray) -> NDArray:
         """Return the factors (N, 4) of actions (N, 4) on the stiffness at action 0, or on the schedule.

@@ -58,10 +58,7 @@ class WornFeet:
         Raises `SpringfootError` for feet that this batch cannot wear.
         """
         chosen = [None if foot is None else foot_setting(name, foot) for foot in feet]
-        legs_of = getattr(self._settings, name).adapted
         for foot in chosen:
-            if foot is not None and foot.adapted not in (None, legs_of):
-                raise SpringfootError(f"{name}: a foot of a reset has no adapted, as legs are of the batch")
             if foot is not None and act_one_way((foot.foot, foot.foot)) and not self.one_way:
                 raise SpringfootError(
                     f"{name}: a reset can give an orthosis that engages one way only where the feet of the settings, "

@@ -58,7 +58,7 @@ default of their code, PredSim, `damping_coefficient_all_dofs`).
 """
 JOINT_RANGE_DEG = ((-60.0, 120.0), (-10.0, 150.0), (-60.0, 45.0), (-45.0, 90.0))
 """Stops of the joints [deg], in the order of `JOINTS`; chosen: walking on sound feet never reaches them
-(docs/results/cost.md), some of the people who have adapted to other feet do (docs/results/feet.md)."""
+(docs/results/cost.md)."""
 
 _SIGN_AXIS = {"hip": -1.0, "knee": 1.0, "ankle": -1.0, "toe": -1.0}  # about +y a vector turns from z to x
 

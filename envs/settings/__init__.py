@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING
 from springfoot.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from .adapted import ADAPTED, LEGS, committed_feet, without_person
     from .checks import LONGEST_EPISODE
     from .feet import FOOT_SETTINGS, KINDS, SPRING_NUMBERS, foot_setting
     from .settings import (
@@ -22,11 +21,9 @@ if TYPE_CHECKING:
     )
 
 __all__ = [
-    "ADAPTED",
     "CONDITION_SETTINGS",
     "FOOT_SETTINGS",
     "KINDS",
-    "LEGS",
     "LONGEST_EPISODE",
     "SPRING_NUMBERS",
     "THEMES",
@@ -35,23 +32,19 @@ __all__ = [
     "Feedforward",
     "Guide",
     "body_of",
-    "committed_feet",
     "foot_setting",
     "reference_gait",
     "settings_from",
     "settings_to_json",
-    "without_person",
 ]
 
 if not TYPE_CHECKING:  # a type checker would take it to mean that any name exists
     __getattr__ = lazy_names(
         __name__,
         {
-            "ADAPTED": "adapted",
             "CONDITION_SETTINGS": "settings",
             "FOOT_SETTINGS": "feet",
             "KINDS": "feet",
-            "LEGS": "adapted",
             "LONGEST_EPISODE": "checks",
             "SPRING_NUMBERS": "feet",
             "THEMES": "settings",
@@ -60,11 +53,9 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
             "Feedforward": "settings",
             "Guide": "settings",
             "body_of": "settings",
-            "committed_feet": "adapted",
             "foot_setting": "feet",
             "reference_gait": "settings",
             "settings_from": "settings",
             "settings_to_json": "settings",
-            "without_person": "adapted",
         },
     )

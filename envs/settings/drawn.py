@@ -12,7 +12,6 @@ from springfoot.errors import SpringfootError, as_float, quoted, require_number
 from springfoot.gait.body.body import Body
 
 from ..physics.foot import Foot
-from .adapted import ADAPTED
 from .checks import check_choice
 from .feet import ENGAGES, TABLES, FootSetting, foot_setting
 
@@ -82,8 +81,6 @@ def drawn_feet_setting(value: Any) -> tuple[DrawnFoot, ...] | None:
 
     def checked(name: str, entry: DrawnFoot) -> DrawnFoot:
         check_choice(f"{name}: on", entry.on, get_args(On))
-        if isinstance(entry.foot, Mapping) and entry.foot.get(ADAPTED) is not None:
-            raise SpringfootError(f"{name}: a drawn foot has no {ADAPTED}, as legs are of the batch")
         _check_ranges(name, entry.foot)
         low, high = (foot_setting(name, _end_of(entry.foot, end)).plain for end in (0, 1))
         return replace(entry, foot=_joined(low, high))

@@ -1,8 +1,7 @@
 """Read the settings `left_foot` and `right_foot`: kinds of feet, sound or prosthetic, and their numbers, once, into a
 `FootSetting`, whose `foot` is that of the physics (`envs.physics.foot`).
 
-In plain JSON values a foot is a word, its kind, or a dictionary with a `kind` and any of the numbers of that kind;
-`adapted` says that the person has adapted to it (`envs.settings.adapted`).
+In plain JSON values a foot is a word, its kind, or a dictionary with a `kind` and any of the numbers of that kind.
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,7 +15,6 @@ from springfoot.errors import SpringfootError, require_within
 from springfoot.gait.springs.stiffness import SPRINGS, StiffnessSchedule
 
 from ..physics.foot import LOCK, WAYS, Feet, Foot, FootJoint, Spring
-from .adapted import ADAPTED, adapted_setting
 
 FOOT_SETTINGS = ("left_foot", "right_foot")
 """Settings that are feet."""
@@ -119,12 +117,7 @@ class FootSetting:
     def numbers(self) -> dict[str, Any]:
         """Return the given numbers, lines, schedule and orthosis by name; all others have their defaults."""
         given = {} if isinstance(self.plain, str) else self.plain
-        return {name: value for name, value in given.items() if name not in ("kind", ADAPTED)}
-
-    @property
-    def adapted(self) -> str | dict[str, Any] | None:
-        """Return the person who has adapted to the foot: a name, or leg constants by speed; None for nobody."""
-        return None if isinstance(self.plain, str) else self.plain.get(ADAPTED)
+        return {name: value for name, value in given.items() if name != "kind"}
 
     @cached_property
     def foot(self) -> Foot:
@@ -157,10 +150,12 @@ def _checked_foot(name: str, value: Any) -> str | dict[str, Any]:
         raise SpringfootError(f"{name} must be one of {', '.join(map(repr, KINDS))}{form}, got {kind!r:.60}")
     if not isinstance(value, Mapping):
         return kind
+    if "adapted" in value:  # of files of before
+        raise SpringfootError(f'{name}: adapted people are gone; the setting person="learned" walks on every foot')
     plain: dict[str, Any] = {"kind": kind}
     # Beside numbers a kind may have torque-angle lines or a schedule, each in place of the numbers of its joint.
     replacements = {"passive": TABLES, "adaptive": ("schedule",)}.get(kind, ())
-    further = *replacements, "orthosis", ADAPTED
+    further = *replacements, "orthosis"
     given = {key: number for key, number in value.items() if key not in ("kind", *further)}
     plain |= _checked_numbers(name, f"a foot of kind {kind!r}", given, KINDS[kind] | SEGMENT_RATIOS, further)
     for key in replacements:
@@ -175,8 +170,6 @@ def _checked_foot(name: str, value: Any) -> str | dict[str, Any]:
                 plain[key] = _checked_table(f"{name}: {key}", value[key])
     if (orthosis := value.get("orthosis")) is not None:
         plain["orthosis"] = _checked_orthosis(f"{name}: orthosis", orthosis)
-    if value.get(ADAPTED) is not None:
-        plain[ADAPTED] = adapted_setting(name, kind, value[ADAPTED])
     return kind if len(plain) == 1 else plain  # a word where the kind says all
 
 
@@ -314,7 +307,7 @@ def foot_pairs(settings: Mapping[str, Any], num: int) -> tuple[dict[str, Any], l
 
     In `settings` `left_foot` and `right_foot` may be lists, a foot for each of `num` environments. The returned
     settings have the first foot of each list; the pairs are None without lists. Raises `SpringfootError` for a list of
-    another length, and for feet of a list to which different people have adapted.
+    another length.
     """
     listed = {name: settings[name] for name in FOOT_SETTINGS if isinstance(settings.get(name), (list, tuple))}
     for name, feet in listed.items():
@@ -324,9 +317,6 @@ def foot_pairs(settings: Mapping[str, Any], num: int) -> tuple[dict[str, Any], l
         name: [foot_setting(name, foot) for foot in listed.get(name, [settings.get(name, INTACT_FOOT)] * num)]
         for name in FOOT_SETTINGS
     }
-    for name, feet in all_feet.items():
-        if any(foot.adapted != feet[0].adapted for foot in feet):
-            raise SpringfootError(f"{name}: all feet of a list must have the same {ADAPTED}, as legs are of the batch")
     first = {name: all_feet[name][0] for name in listed}
     pairs = [(left.foot, right.foot) for left, right in zip(*all_feet.values(), strict=True)]
     return {**settings, **first}, pairs if listed else None

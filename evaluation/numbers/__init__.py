@@ -10,13 +10,12 @@ if TYPE_CHECKING:
     from .metrics import MOMENT_CURVES, Gait, measure
     from .per_leg import asymmetry, leg_numbers
     from .series import foot_contacts, strides_within
-    from .tally import SHORTEST_SPEED, StrideTally, add_episode
+    from .tally import StrideTally, add_episode
 
 __all__ = [
     "HUMAN_LIKE",
     "MOMENT_CURVES",
     "NO_FALLS",
-    "SHORTEST_SPEED",
     "WALKS",
     "Criterion",
     "Gait",
@@ -41,7 +40,6 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
             "HUMAN_LIKE": "criteria",
             "MOMENT_CURVES": "metrics",
             "NO_FALLS": "criteria",
-            "SHORTEST_SPEED": "tally",
             "WALKS": "criteria",
             "Criterion": "criteria",
             "Gait": "metrics",

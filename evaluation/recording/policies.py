@@ -15,7 +15,7 @@ from springfoot.agents.policies.baselines import (
     own_settings,
 )
 from springfoot.agents.policies.foreign import is_function
-from springfoot.agents.policies.policy import OF_FEET, SHIPPED, load_policy
+from springfoot.agents.policies.policy import SHIPPED, load_policy
 from springfoot.agents.policies.schedule_files import schedule_file
 from springfoot.envs.settings.settings import CONDITION_SETTINGS, BipedSettings, settings_from, settings_to_json
 from springfoot.errors import SpringfootError, perhaps
@@ -63,9 +63,7 @@ def policy_and_settings(
         settings = settings_from(**(schedule_settings | overriding))
         return policy_for(settings), settings
     if name not in SHIPPED and not Path(name).exists() and not is_function(name):
-        names = ", ".join(
-            [*(name for name in SHIPPED if name not in OF_FEET), f"{OF_FEET[0]} to {OF_FEET[-1]}", *BASELINES]
-        )
+        names = ", ".join((*SHIPPED, *BASELINES))
         raise SpringfootError(
             f"no policy {name!r}: give a .safetensors or .onnx file, a run folder, a schedule in a .csv or .json file, "
             f"module:function, {FROZEN}:POLICY, or one of {names}{perhaps(kind, (*SHIPPED, *BASELINES, FROZEN))}"

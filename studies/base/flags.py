@@ -97,8 +97,6 @@ def foot_given(value: str | dict[str, Any]) -> str | dict[str, Any]:
     return value
 
 
-FootFlag = Annotated[str | dict[str, Any], reader_of_words(_read_word_or_json, "WORD|JSON|FILE")]
-"""Type of a flag for a foot; `foot_given` converts its value to a setting."""
 LIST_FLAGS = ("drawn_feet", "drawn_bodies")
 """Settings whose flag is a list in JSON."""
 FILE_FLAGS = {"human": read_own_gait}

@@ -1,7 +1,7 @@
 """Compute intervals of means and fractions, and a test of two policies' falls in the same episodes."""
 
 import numpy as np
-from scipy.stats import binomtest, bootstrap, t
+from scipy.stats import binomtest, bootstrap
 
 from springfoot.arrays import NDArray
 
@@ -29,17 +29,6 @@ def mean_interval(values: NDArray, level: float = LEVEL) -> tuple[float, float]:
         rng=np.random.default_rng(0),
     )
     return float(result.confidence_interval.low), float(result.confidence_interval.high)
-
-
-def t_interval(values: NDArray, level: float = LEVEL) -> tuple[float, float]:
-    """Return Student's interval of the mean of a few values (n,), such as training seeds; -inf to inf for a single
-    value."""
-    if len(values) < 2:
-        return -np.inf, np.inf
-    mean = float(np.mean(values))
-    standard_error = float(np.std(values, ddof=1) / np.sqrt(len(values)))
-    half = standard_error * float(t.ppf(0.5 + 0.5 * level, len(values) - 1))
-    return mean - half, mean + half
 
 
 def share_interval(count: int, total: int, level: float = LEVEL) -> tuple[float, float]:

@@ -1,1 +1,1 @@
-"""Studies of feet: people adapted to a foot, prostheses, orthoses."""
+"""Studies of feet and of the persons who wear them: controls of the price, learned persons, orthoses."""

@@ -5,8 +5,7 @@
 Nobody adapts here: legs and the stiffness of both feet are those of sound feet (`pretrained`), so that only the muscle
 and the spring change. The stiffness of an orthosis is in N m/deg, as Waterval et al. (2019) measured it. A weak calf
 slows the walk, and each spring slows it by another amount, while the energy for a metre depends on speed. So each walk
-is commanded several speeds, and energies are compared at equal walked speeds. Last come two people who have adapted to
-such a foot, without an orthosis.
+is commanded several speeds, and energies are compared at equal walked speeds.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -22,7 +21,6 @@ import tyro
 from matplotlib.figure import Figure
 from scipy.stats import rankdata
 
-from springfoot.envs.settings import ADAPTED, committed_feet, without_person
 from springfoot.errors import require_count
 from springfoot.evaluation.numbers import measure
 from springfoot.evaluation.recording import policy_and_settings, record_feet
@@ -32,7 +30,7 @@ from springfoot.files.markdown import MISSING, table, text_of
 from ..base.intervals import share_interval
 from ..base.kept import Kept
 from ..base.study import Answer, OnProgress, WalkingStudy
-from .foot_walks import ABOUT_STOPS, NAMES, SCHEDULE, TOLD, UNSEARCHED, numbers_of, walked
+from .foot_numbers import NAMES, numbers_of
 from .walked_speeds import TWO_PRICES, Row, at_walked_speeds, rows_csv
 
 PER_DEG = 180.0 / np.pi
@@ -49,8 +47,6 @@ WALKED_SPEEDS = (0.9, 1.1, 1.3)
 """Walked speeds at which springs are compared [m/s]; energy is interpolated linearly between two walks."""
 DROP_SPEEDS = (0.8, 1.2, 1.6)
 """Commanded speeds of walks with a drop foot [m/s]."""
-WHO_ADAPTED = ("weak, 20 %", "drop")
-"""Names of the committed people who have adapted to such a foot."""
 SWING_SPRINGS = (0.0, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0, 20.0, 40.0)
 """Stiffness of an orthosis for a drop foot [N m/rad]."""
 SWING_RESTS = (-5.0, 0.0, 5.0, 10.0)
@@ -86,13 +82,12 @@ class Orthosis(WalkingStudy):
         """Return the simulated time of all walks if none falls [s]."""
         weak = len(list(self._weak_cells())) * len(WEAK_SPRINGS) * self.episodes
         drop = 2 * len(self._drop_speeds()) * len(SWING_SPRINGS) * len(SWING_RESTS) * self.episodes_drop
-        return (weak + drop + 4 * len(self._people()) * self.episodes_drop) * self.seconds
+        return (weak + drop) * self.seconds
 
     def ask(self, progress: OnProgress) -> Answer:
         """Walk with every spring."""
         kept = Kept(self.keep)
         with_drop_foot = replace(self, episodes=self.episodes_drop)
-        with_people = replace(with_drop_foot, seed=UNSEARCHED)  # from seeds that no search has used
         weak = self._weak(kept, progress)
         drop = with_drop_foot._drop(kept, progress)
         even = at_walked_speeds(weak, SPRING_OF_A_BODY, (1.1,) if self.quick else WALKED_SPEEDS)
@@ -108,13 +103,9 @@ class Orthosis(WalkingStudy):
             "weak.png": partial(draw_weak, rows=even, best=best),
             "drop.png": partial(draw_drop, rows=drop),
         }
-        text = {
-            "WEAK": weak_text(weak, best, by_effort, as_asked, self.what_ran),
-            "DROP": drop_text(drop, self.episodes_drop, with_drop_foot.what_ran, self.push_newton),
-            "ADAPTED": people_text(with_people._adapted(kept, progress), with_people.what_ran, self.push_newton),
-        }
-        text = {name: section for name, section in text.items() if section}
-        return Answer(text="\n\n".join(text.values()), files=files)
+        weak_section = weak_text(weak, best, by_effort, as_asked, self.what_ran)
+        drop_section = drop_text(drop, self.episodes_drop, with_drop_foot.what_ran, self.push_newton)
+        return Answer(text=f"{weak_section}\n\n{drop_section}", files=files)
 
     def _weak(self, kept: Kept, progress: OnProgress) -> list[dict[str, Any]]:
         """Return a row for each weak calf, body, commanded speed and spring."""
@@ -144,26 +135,6 @@ class Orthosis(WalkingStudy):
                 rows.append({**line, "falls_pushed": pushed["falls"]})
         return rows
 
-    def _adapted(self, kept: Kept, progress: OnProgress) -> list[dict[str, Any]]:
-        """Return rows of walks on the feet of `WHO_ADAPTED`: with legs of sound feet, and with the adapted person's."""
-        rows = []
-        schedule, as_factors = SCHEDULE
-        for name in self._people():
-            foot_alone = without_person(committed_feet()[name])
-            walks = (
-                ("not adapted", self.policy, foot_alone, {}),
-                ("adapted", schedule, {**foot_alone, ADAPTED: name}, as_factors),
-            )
-            for person, policy, foot, given in walks:
-                given = {**given, "right_foot": foot, "episode_seconds": self.seconds}
-                # All that the numbers depend on; they do not on the threads.
-                question = [policy, given, committed_feet()[name], {**self.how, "threads": 0}, self.push_newton, NAMES]
-                numbers = kept.get(
-                    question, lambda p=policy, g=given: walked(p, g, self.push_newton, progress=progress, **self.how)
-                )
-                rows.append({"foot": name, "person": person, **numbers})
-        return rows
-
     def _weak_cells(self) -> Iterator[tuple[float, float, float]]:
         """Yield mass [kg], commanded speed [m/s] and strength of each weak calf."""
         if self.quick:
@@ -172,9 +143,6 @@ class Orthosis(WalkingStudy):
 
     def _drop_speeds(self) -> Sequence[float]:
         return (1.2,) if self.quick else DROP_SPEEDS
-
-    def _people(self) -> list[str]:
-        return [name for name in WHO_ADAPTED if name in committed_feet()]
 
     def _walk(
         self, kept: Kept, given: Mapping[str, Any], feet: Sequence[dict[str, Any]], progress: OnProgress
@@ -367,25 +335,6 @@ def drop_text(rows: Sequence[Row], episodes: int, what_ran: str, push_newton: fl
             f"any stiffer one of its rest angle; where 0 of {episodes} fell, up to {most:.0%} may fall (95 %, Wilson)."
         )
     )
-
-
-def people_text(rows: Sequence[Row], what_ran: str, push_newton: float) -> str:
-    """Return the report's section on people who adapted; empty if there are none."""
-    head = ["right foot", "person", *(number.label for number in TOLD)]
-    lines = [
-        [row["foot"], row["person"], *(_unless_all_fall(row, number.key, number.pattern) for number in TOLD)]
-        for row in rows
-    ]
-    note = (
-        f"{what_ran}, undisturbed and, for `falls, pushed`, pushed by ±{push_newton:g} N; without an orthosis. "
-        f"{ABOUT_STOPS}"
-    )
-    return f"{table(head, lines)}\n\n{note}" if lines else ""
-
-
-def _unless_all_fall(row: Row, key: str, pattern: str) -> str:
-    """Return a number of a walk as text; a dash where every episode fell, but for the falls themselves."""
-    return MISSING if row["falls"] == 1.0 and not key.startswith("falls") else text_of(row[key], pattern)
 
 
 def _cell(row: Row) -> str:

@@ -1,5 +1,4 @@
-"""Read and write the files of constants that searches start from and write: leg constants, adapted
-feet, styles of walks."""
+"""Read and write the files of constants that searches start from and write: leg constants and styles of walks."""
 
 import json
 from importlib import resources
@@ -12,18 +11,11 @@ from springfoot.files.writing import write_atomically
 
 CONSTANTS = Path(str(resources.files("springfoot.envs.control") / "legs.json"))
 """The package's leg constants; in a clone, the committed file."""
-ADAPTED_FEET = CONSTANTS.with_name("adapted.json")
-"""The package's constants of people who have adapted to a foot."""
 
 
 def read_constants(path: Path) -> dict[str, Any]:
     """Return the content of a file of leg constants: `constants` by name, and `found_by`, the commands."""
     return _read(path, "constants", "leg constants")
-
-
-def read_feet(path: Path) -> dict[str, Any]:
-    """Return the content of a file of adapted feet, as `feet` and `found_by`; empty ones if there is no file."""
-    return _read(path, "feet", "adapted feet") if path.exists() else {"found_by": {}, "feet": {}}
 
 
 def read_styles(path: Path) -> dict[str, Any]:

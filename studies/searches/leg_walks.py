@@ -21,7 +21,6 @@ from springfoot.envs.control import (
     reference_walk_at,
     stiffness_ranges,
 )
-from springfoot.envs.physics import Feet
 from springfoot.envs.settings import BipedSettings
 from springfoot.evaluation.numbers import StrideTally, add_episode
 from springfoot.evaluation.recording import Episodes, record_walk
@@ -57,31 +56,24 @@ def walk(
     ease: float = 0.0,
     foreign: Sequence[NDArray] = FOREIGN,
     seconds: float = SECONDS,
-    right: Sequence[LegConstants] | None = None,
-    feet: Sequence[Feet] | None = None,
 ) -> "Walks":
     """Record the walks of C candidate leg constants, side by side: N / C walks of each candidate, one for each seed.
 
     Args:
         settings: settings of the environment.
-        candidates: C leg constants, of both legs unless `right` is given.
+        candidates: C leg constants.
         seeds: N seeds, those of the first candidate first.
         threads: threads of the physics.
         ease: fraction [0, 1] by which the rest angles move from the settings' to the planned ones.
         foreign: stiffness curves (SAMPLES, 2) on `GRID`, one for each of the last walks of a candidate; its first walks
             have the schedule.
         seconds: length of each walk [s].
-        right: C leg constants of the right leg.
-        feet: C feet, in place of the settings' feet.
     """
     num = len(seeds)
     walks_each = num // len(candidates)
     variant = np.repeat(np.arange(len(candidates)), walks_each)
     rest = _eased_rest_angles(settings, candidates, ease) if ease else None
-    feet_of_walks = feet and [feet[index] for index in variant.tolist()]
-    biped = Biped(
-        settings, num, threads, legs=candidates, variant=variant, rest=rest, feet=feet_of_walks, right_legs=right
-    )
+    biped = Biped(settings, num, threads, legs=candidates, variant=variant, rest=rest)
     biped.reset(np.arange(num), seeds)
     # (N,) index of the foreign springs that a walk has; negative for the schedule.
     springs = np.tile(np.arange(walks_each), len(candidates)) - (walks_each - len(foreign))

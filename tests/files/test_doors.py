@@ -17,7 +17,7 @@ from springfoot.gait.people.human import harmonics
 from springfoot.gait.plan.walk_style import styles_of
 from springfoot.studies.base.kept import Kept
 from springfoot.studies.searches.cma_search import generations
-from springfoot.studies.searches.constants_file import read_constants, read_feet
+from springfoot.studies.searches.constants_file import read_constants
 
 
 def search(path):
@@ -35,7 +35,6 @@ READERS = {
     "styles.json": styles_of,
     "kept.json": Kept,
     "legs.json": read_constants,
-    "feet.json": read_feet,
     "log.json": search,
 }
 TEXTS = [name for name in READERS if name.endswith((".json", ".csv"))]

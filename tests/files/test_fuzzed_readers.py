@@ -24,7 +24,6 @@ READING = {
 """Functions of `files` that open a path."""
 NOT_FUZZED = {
     ("agents/training/session.py", "_evaluate"): "keeps the bytes of the policy that it has just written",
-    ("studies/feet/prosthesis.py", "_digest"): "takes a digest of the bytes",
     ("agents/policies/cards.py", "policy_card"): "takes a digest of a file of the package",
     (
         "agents/training/cluster/rllib_training.py",

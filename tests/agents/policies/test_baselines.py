@@ -14,8 +14,6 @@ from springfoot.gait import Body, SpringfootError
 from springfoot.gait.body.tissue import TOE_STIFFNESS
 from springfoot.gait.springs.stiffness import thesis_schedule
 
-ADAPTED_FOOT = {"kind": "adaptive", "adapted": "adaptive"}
-
 
 def settings_of(name, **values):
     return settings_from(**(own_settings(name, settings_from(**values)) | values))
@@ -63,9 +61,8 @@ def test_constant_of_other_stiffness():
     )
 
 
-@pytest.mark.parametrize("feet", [{}, {"right_foot": ADAPTED_FOOT}, {"left_foot": ADAPTED_FOOT}])
-def test_schedule_sets_the_stiffness_of_the_leg_tuning_each_legs_own(feet):
-    biped = started(settings_from(**feet), np.linspace(0, 1, 21)[:-1])
+def test_schedule_sets_the_stiffness_of_the_leg_tuning():
+    biped = started(BipedSettings(), np.linspace(0, 1, 21)[:-1])
     action = baseline("schedule", biped.settings)(biped.observe()).reshape(20, 2, 2)
     assert stiffness_of(action, biped.settings, Body()) == pytest.approx(biped.scheduled_stiffness(), rel=1e-4)
 

@@ -14,7 +14,7 @@ from springfoot.agents.policies.export import contract_of
 from springfoot.agents.policies.policy import ACTIVATIONS, Output
 from springfoot.agents.training.returns import evaluate_returns
 from springfoot.envs.batch.biped_batch import Biped
-from springfoot.envs.physics.model import ACTIONS
+from springfoot.envs.physics.model import ACTIONS, SIDES
 from springfoot.envs.settings.settings import settings_from, settings_to_json
 from springfoot.envs.task.observation import OBSERVATION
 from springfoot.errors import SpringfootError
@@ -120,19 +120,17 @@ def test_the_stiffness_is_what_the_environment_sets_in_the_body_of_the_contract(
         assert set_to == pytest.approx(stiffness[:, column] * own, rel=3e-5)  # float32
 
 
-@pytest.mark.parametrize("right_foot", ["intact", {"kind": "adaptive", "adapted": "adaptive"}])
-def test_a_residual_export_says_which_schedule_its_factor_multiplies(right_foot, tmp_path):
-    policy = drawn(action_mode="residual", height=1.9, mass=90.0, right_foot=right_foot)
+def test_a_residual_export_says_which_schedule_its_factor_multiplies(tmp_path):
+    policy = drawn(action_mode="residual", height=1.9, mass=90.0)
     biped = Biped(policy.settings, 8)
     biped.reset(np.arange(8), list(range(8)))
     rows, phase = biped.observe(), biped.leg_phase.copy()
     _, factor = exported(policy, tmp_path)(rows)
     schedule = contract_of(policy)["schedule"]
     assert schedule["speed_m_s"] == [1.2]
-    assert ("right" in schedule) == (right_foot != "intact")
     info, own = biped.step(policy(rows)).info, 90.0 / 63.0 * 1.9 / 1.7
-    for side, (name, curves) in enumerate((("left", schedule), ("right", schedule.get("right", schedule)))):
-        ankle = np.interp(phase[:, side], np.arange(100) / 100, curves["ankle"][0], period=1.0)
+    for side, name in enumerate(SIDES):
+        ankle = np.interp(phase[:, side], np.arange(100) / 100, schedule["ankle"][0], period=1.0)
         assert info[f"stiffness/ankle_{name}"] == pytest.approx(factor[:, 2 * side] * ankle * own, rel=3e-5)  # float32
 
 

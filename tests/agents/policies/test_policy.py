@@ -182,6 +182,7 @@ def changed(policy, path, header=None, tensors=None):
         ({"settings": {"hight": 1.7}}, {}, "'hight'.*height"),
         ({"settings": {"mass": -1.0}}, {}, "mass must be"),
         ({"settings": [1]}, {}, "header is not valid"),
+        ({"settings": {"right_foot": {"kind": "rigid", "adapted": "rigid"}}}, {}, 'the setting person="learned" walks'),
         ({"network": {}}, {}, "header has no 'observation_clip'"),
         ({"network": NETWORK | {"layer_sizes": [3, 4], "activation": "gelu"}}, {}, "a network this version does not"),
         ({"network": NETWORK | {"layer_sizes": [3, 4], "output": "sign"}}, {}, "a network this version does not"),

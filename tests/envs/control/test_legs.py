@@ -15,6 +15,7 @@ from springfoot.envs.control.equilibrium import PLATEAUS, REFERENCE_STIFFNESS, n
 from springfoot.envs.control.legs import knot_curve
 from springfoot.envs.control.phase_table import GRID
 from springfoot.envs.control.reference_walk import reference_walk_at
+from springfoot.envs.control.stiffness_control import action_of
 from springfoot.envs.physics.model import HIP, LEFT, RIGHT
 from springfoot.envs.settings.settings import BipedSettings
 from springfoot.errors import SpringfootError
@@ -131,6 +132,21 @@ def test_the_swing_hip_turns_with_the_coms_place_over_the_stance_foot():
     assert abs(ahead) > 0.001
     assert turned[RIGHT] == pytest.approx(0.8 / (1.9 / 1.7) * ahead, rel=1e-3)
     assert turned[LEFT] == 0.0
+
+
+def test_a_slope_moves_the_legs_on_it_and_no_bit_beside_it():
+    def walked(slope_deg):
+        biped = Biped(BipedSettings(), 2)
+        biped.subjects.slope[:] = 0.0, np.radians(slope_deg)
+        biped.reset(np.arange(2), [3, 3])
+        for _ in range(20):
+            action = action_of(biped.scheduled_stiffness(), biped.settings, biped.body)
+            observation = biped.step(action.reshape(2, -1)).observation
+        return observation
+
+    level, beside = walked(0.0), walked(4.0)
+    np.testing.assert_array_equal(beside[0], level[0])
+    assert (beside[1] != level[1]).any()
 
 
 def test_the_phase_waits_for_a_late_foot_and_starts_anew_with_it():

@@ -138,7 +138,7 @@ def test_bodies_are_drawn_by_their_weights_and_keep_the_settings_ratios():
             r"drawn_feet\[1\]: ankle_table: torque must be in",
         ),
         ({"foot": {"kind": "adaptive", "schedule": [1, 2]}}, r"drawn_feet\[1\]: schedule: "),
-        ({"foot": {"kind": "passive", "adapted": "passive"}}, r"drawn_feet\[1\]: a drawn foot has no adapted"),
+        ({"foot": {"kind": "passive", "adapted": "passive"}}, r"drawn_feet\[1\]: adapted people are gone"),
         ({"on": "one"}, r"drawn_feet\[1\] needs a foot"),
         (
             {"foot": "rigid", "on": "top"},

@@ -23,10 +23,10 @@ KIND_LIST = ", ".join(map(repr, KINDS))
 OF_A_SPRING = "ankle_stiffness, ankle_deg, toe_stiffness, toe_deg, damping_time"
 RATIOS = "shank_mass_ratio, shank_com_ratio, shank_inertia_ratio, foot_mass_ratio, foot_inertia_ratio"
 OF_AN_ORTHOSIS = f"{OF_A_SPRING}, engages"
-OF_A_FOOT = f"{RATIOS}, orthosis, adapted"
-OF_PASSIVE = f"{OF_A_SPRING}, {RATIOS}, ankle_table, toe_table, orthosis, adapted"
+OF_A_FOOT = f"{RATIOS}, orthosis"
+OF_PASSIVE = f"{OF_A_SPRING}, {RATIOS}, ankle_table, toe_table, orthosis"
 WAY_LIST = "one of 'dorsiflexion', 'plantarflexion'"
-OF_ADAPTIVE = f"ankle_deg, toe_deg, {RATIOS}, schedule, orthosis, adapted"
+OF_ADAPTIVE = f"ankle_deg, toe_deg, {RATIOS}, schedule, orthosis"
 
 WRONG_KINDS: list[tuple[Any, str]] = [
     ("rigd", f"right_foot must be one of {KIND_LIST}, got 'rigd'"),
@@ -77,6 +77,10 @@ WRONG_KEYS: list[tuple[Any, str]] = [
     (
         {"kind": "drop", "orthosis": {"kind": "passive"}},
         f"right_foot: orthosis: an orthosis has no 'kind'; valid: {OF_AN_ORTHOSIS}",
+    ),
+    (
+        PASSIVE | {"adapted": "passive"},
+        'right_foot: adapted people are gone; the setting person="learned" walks on every foot',
     ),
     (
         PASSIVE | {"engages": "dorsiflexion"},

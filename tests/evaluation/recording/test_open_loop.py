@@ -187,7 +187,7 @@ ERRORS = [
     (
         "frozen:nobody",
         "no policy 'nobody': give a .safetensors or .onnx file, a run folder, a schedule in a .csv or .json file, "
-        "module:function, frozen:POLICY, or one of pretrained, medium, predicted, passive-1-0 to adaptive-2-4, "
+        "module:function, frozen:POLICY, or one of pretrained, medium, predicted, "
         f"{', '.join(BASELINES)}",
     ),
 ]

@@ -1,0 +1,47 @@
+"""Compute the numbers of a walk on different feet that a designer of feet asks for."""
+
+from typing import Any
+
+from springfoot.evaluation.numbers import Gait, asymmetry, leg_numbers
+
+NAMES = (
+    *("falls", "speed_m_s", "push_off_J_kg", "sound_peak_bw", "step_asymmetry", "hip_work_J_kg_m", "fibre_J_kg_m"),
+    *("effort", "ankle_range_deg", "toe_range_deg", "clearance_m"),
+)
+"""Names of the numbers. They are part of the question of kept results, so that a new number has all walks measured
+again."""
+
+
+def numbers_of(gait: Gait) -> dict[str, float | None]:
+    """Return the numbers of an undisturbed walk, by `NAMES`; None for numbers without a stride.
+
+    The left foot is the sound one, the right one is examined.
+    """
+    metrics = gait.metrics
+    tally = gait.tally
+    sound, examined = leg_numbers(tally).values()
+    step_asymmetry = asymmetry({"left": sound, "right": examined})["step_length"]
+    step_length = metrics["step_length_m"]
+    numbers: dict[str, float | None] = {
+        "falls": metrics["falls"] / metrics["episodes"],
+        "speed_m_s": metrics["speed_m_s"]["mean"],
+        "push_off_J_kg": _sum(examined["joint_work_J_kg"][joint]["positive"] for joint in ("ankle", "toe")),
+        "sound_peak_bw": sound["vertical_max_mean_bw"],
+        "step_asymmetry": None if step_asymmetry is None else abs(step_asymmetry),
+        "hip_work_J_kg_m": None,
+        "fibre_J_kg_m": metrics["effort"]["fibre_J_kg_m"],
+        "effort": metrics["effort"]["total"],
+        "ankle_range_deg": examined["joint_range_deg"]["ankle"],
+        "toe_range_deg": examined["joint_range_deg"]["toe"],
+        "clearance_m": examined["toe_clearance_m"],
+    }
+    hip_work = _sum(leg["joint_work_J_kg"]["hip"]["positive"] for leg in (sound, examined))
+    if hip_work is not None and step_length:
+        numbers["hip_work_J_kg_m"] = hip_work / (2 * step_length)  # per metre: a stride is two steps
+    return numbers
+
+
+def _sum(values: Any) -> float | None:
+    """Return the sum of values; None if one of them is None."""
+    values = list(values)
+    return None if None in values else float(sum(values))
