@@ -36,7 +36,7 @@ CASES = {AS_KNOWN: AS_IS, **TENDONS}
 """Name of each case -> its muscles."""
 CHARGES = {"torque": "rise of K with torque", "tendon": "`ankle_tendon`"}
 """Number on which the charge of K hangs -> its words."""
-PLAN = "the plan"
+THE_PLAN = "the plan"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,7 +93,13 @@ def plan_prices() -> list[Row]:
     rows = []
     for case, muscle in CASES.items():
         effort = effort_of(plan, muscle)
-        row = {"walk": PLAN, "case": case, "falls": 0.0, "fibre_J_kg_m": effort.work * GRAVITY, "effort": effort.total}
+        row = {
+            "walk": THE_PLAN,
+            "case": case,
+            "falls": 0.0,
+            "fibre_J_kg_m": effort.work * GRAVITY,
+            "effort": effort.total,
+        }
         rows.append(row | dict.fromkeys(JOINTS))
     return rows
 
