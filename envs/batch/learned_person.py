@@ -36,7 +36,7 @@ def person_file(name: str) -> Path:
     """Return the file of a person, one of `LEARNED` or a path; raise `SpringfootError` if there is none."""
     path = FOLDER / f"{LEARNED[name]}.safetensors" if name in LEARNED else Path(name)
     if not path.is_file():
-        known = ", ".join(map(repr, ("tuned", *LEARNED)))
+        known = ", ".join(repr(one) for one in ("tuned", *LEARNED) if one != name)
         raise SpringfootError(f"person must be one of {known}, or the file of a policy that is one, got {name!r}")
     return path
 

@@ -355,7 +355,7 @@ class FootSprings:
         for index in ids:
             body = self._subjects.home(index)
             middle, _ = _log_scale(self._settings, body)
-            scale = body.stiffness_scale
+            scale = body.strength_scale  # a load makes neither tendon nor tissue stiffer
             self.options[["middle", "tendon", "tissue"]][index] = middle, tendon * scale, scale
         pairs = self._worn.pairs
         new_lines = not has_lines_of(self._known, [pairs[index] for index in ids])

@@ -97,19 +97,46 @@ def torque_ranges(body: Body, feet: Feet) -> NDArray:
     )
 
 
-def armatures_of(body: Body, feet: Feet) -> NDArray:
-    """Return the armature of the joints of both legs [kg m^2], (side, joint): that of muscles, and a device's.
+def springs_of(model: mujoco.MjModel) -> tuple[NDArray, NDArray]:
+    """Return what a compiled model says of its joints' actuators: beta [s], (side, joint), and the lowest and highest
+    torque [N m], (side, joint, 2)."""
+    legs = (len(SIDES), len(JOINTS))
+    names = [f"{joint}_{side}" for side in SIDES for joint in JOINTS]
+    beta = [-model.actuator(f"stiffness_{name}").gainprm[2] for name in names]
+    joints = [model.joint(name).id for name in names]
+    limited = model.jnt_actfrclimited[joints].astype(bool)
+    limits = np.where(limited[:, None], model.jnt_actfrcrange[joints], [-np.inf, np.inf])
+    return np.reshape(beta, legs), limits.reshape(*legs, 2)
 
-    A device without an armature of its own has h K beta / 2, h the physics step: as with `LOCK`, its contacts would
-    else give the body energy.
+
+def armatures_of(body: Body, feet: Feet) -> NDArray:
+    """Return the armature of the joints of both legs [kg m^2], (side, joint): that of muscles, a device's, a brace's.
+
+    Damped springs without an armature of their own have h K beta / 2, h the physics step: as with `LOCK`, contacts
+    would else give the body energy.
     """
     armature = np.array(ARMATURE) * body.mass_scale * body.length_scale**2 + np.zeros((len(SIDES), len(JOINTS)))
-    beta = damping_times_of(body, feet)
+    usual = damping_times(body)
     for side, foot in enumerate(feet):
         for joint, described in enumerate(joints_of(foot)):
             if device := described.device:
-                armature[side, joint] += device.armature or 0.5 * PHYSICS_STEP * device.steepest * beta[side, joint]
+                stiffest = device.steepest
+                if foot.schedule and joint >= ANKLE:  # the device's stiffness is the schedule's
+                    stiffest = max(
+                        segment.stiffness for segment in (foot.schedule.ankle, foot.schedule.toe)[joint - ANKLE]
+                    )
+                armature[side, joint] += device.armature or _inertia_for(device, stiffest, usual[joint])
+            orthosis = described.orthosis
+            if orthosis and not orthosis.engages:  # one-way springs have no damping
+                armature[side, joint] += _inertia_for(orthosis, orthosis.steepest, usual[joint])
     return armature
+
+
+def _inertia_for(spring: Spring, stiffness: float, usual_time: float) -> float:
+    """Return h K beta / 2 [kg m^2] of a spring of that stiffness [N m/rad]; `usual_time` [s] where it has no damping
+    time of its own."""
+    beta = usual_time if spring.damping_time is None else spring.damping_time
+    return 0.5 * PHYSICS_STEP * stiffness * beta
 
 
 def passive_damping(body: Body) -> np.ndarray:

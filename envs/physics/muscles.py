@@ -55,8 +55,8 @@ tissue_stiffness = part(ankle_tissue_stiffness)
 def muscles_of(body: Body, feet: Feet) -> NDArray:
     """Return (1,) of `MUSCLES`, of a body on its feet."""
     row = np.zeros(1, MUSCLES)
-    row["tissue"] = body.stiffness_scale
-    row["give"] = np.array(TENDON_GIVE) / body.stiffness_scale
+    row["tissue"] = body.strength_scale  # a load makes no tissue stiffer
+    row["give"] = np.array(TENDON_GIVE) / body.strength_scale
     row["present"] = [[joint.has_muscles for joint in joints_of(foot)] for foot in feet]
     row["activation"] = volume_weights() / leg_strengths(body, feet) ** 2
     return row

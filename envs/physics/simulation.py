@@ -22,7 +22,7 @@ from .contact import CONTACTS, FRICTION
 from .energy import RECORDED, StepRecord, WindowWork, parts_of, window_work
 from .foot import SOUND, Feet, act_one_way
 from .measurement import BODY_ROW, DEGREES, Measurement, measure_bodies, segments_of
-from .model import JOINTS, SIDES, build_model
+from .model import JOINTS, SIDES, build_model, springs_of
 from .muscles import forget, muscles_of
 from .timing import CONTROL_WINDOW
 
@@ -94,6 +94,8 @@ class Simulation:
         if (self.model.nq, self.model.nv, self.model.na, self.model.nu) != (DEGREES, DEGREES, 0, 2 * (DEGREES - 3)):
             raise SpringfootError("a custom model must have the joints and the actuators of the default one")
         self._custom_model = model is not None
+        if model is not None:
+            _require_known_steps(model)
         self._substeps = round(CONTROL_WINDOW / self.model.opt.timestep)
         self._batch = Batch(self.model, num, require_count("threads", threads, 1, MOST_THREADS))
         if len(built) > 1:
@@ -107,6 +109,8 @@ class Simulation:
         self._turn = self._batch.bind("mocap_quat")
         bodies = np.zeros(num, BODY_ROW)
         bodies["segments"] = np.concatenate([segments_of(body, pair) for pair in self.feet])
+        if model is not None:  # its springs may differ from the default ones
+            bodies["segments"]["beta"], bodies["segments"]["torque"] = springs_of(model)
         bodies["muscles"]["muscles"] = np.concatenate([muscles_of(body, pair) for pair in self.feet])
         self._parts = np.concatenate([parts_of(body, pair) for pair in self.feet])
         self._ground = bodies["ground"]
@@ -250,3 +254,15 @@ class Simulation:
         data = self._batch.get_data(index)
         mujoco.mj_forward(self.models[index], data)
         return data
+
+
+def _require_known_steps(model: MjModel) -> None:
+    """Raise `SpringfootError` unless the physics steps of a custom model fill a control window and move the joints by
+    the velocity after a step, which the price of the muscles takes for granted."""
+    steps = CONTROL_WINDOW / model.opt.timestep
+    if round(steps) < 1 or abs(steps - round(steps)) > 1e-9:
+        raise SpringfootError(
+            f"a custom model's timestep must be a whole part of {CONTROL_WINDOW:g} s, got {model.opt.timestep:g} s"
+        )
+    if model.opt.integrator == mujoco.mjtIntegrator.mjINT_RK4:
+        raise SpringfootError("a custom model's integrator must be Euler, implicit or implicitfast, got RK4")

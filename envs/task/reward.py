@@ -179,7 +179,7 @@ def _charged_stiffness(scale, controls, body, tendon, side, joint):
     if joint > 0 or tendon == 0.0 or stiffness == 0.0:
         return stiffness
     angle = body.measured.angle[side]
-    unit = scale.stiffness_scale
+    unit = scale.strength_scale
     tissue = unit * tissue_stiffness(angle[KNEE], angle[ANKLE])
     return _charged_calf_stiffness(stiffness, tissue, body.muscles.moment[0, side, ANKLE], tendon, unit)
 

@@ -33,7 +33,7 @@ SCALES = np.dtype(
         ("pose_share", float, len(JOINTS)),
         ("stiffness_unit", float, 2),  # ankle, toe [N m/rad]
         ("stiffness_share", float, 2),
-        ("stiffness_scale", float),  # over that of 1.70 m and 63 kg [-]
+        ("strength_scale", float),  # of tissue and tendons, over that of 1.70 m and 63 kg [-]
         ("weight", float),  # of body and load [N]
     ]
 )
@@ -52,6 +52,6 @@ def body_scales(body: Body) -> NDArray:
     scales["pose_share"] = [POSE_WEIGHTS[joint] for joint in range(len(JOINTS))]
     scales["stiffness_unit"] = np.array([ANKLE_STIFFNESS_UNIT, TOE_STIFFNESS_UNIT]) * body.stiffness_scale
     scales["stiffness_share"] = np.array([1.0, TOE_SHARE]) / (1.0 + TOE_SHARE)
-    scales["stiffness_scale"] = body.stiffness_scale
+    scales["strength_scale"] = body.strength_scale
     scales["weight"] = body.total_mass * GRAVITY
     return scales

@@ -67,7 +67,7 @@ def episode_effort(
         series["muscle_work"][first:last],
         TICK,
         leg_strengths(body, feet),
-        body.stiffness_scale,
+        body.strength_scale,
         muscle,
     )
     inner = slice(first + 1, last - 1)  # the ticks that `use` is of
@@ -139,7 +139,7 @@ def stiffness_charge(recording: Recording, factor: float = 1.0) -> float:
     settings = recording.settings
     if settings.ankle_tendon is None:
         raise SpringfootError("stiffness_charge needs a recording with ankle_tendon, got None")
-    scale = body_of(settings).stiffness_scale
+    scale = body_of(settings).strength_scale
     every = round(settings.step_seconds / TICK)
     at_ends = {name: values[:, every - 1 :: every].astype(float) for name, values in recording.series.items()}
     angle = at_ends["angle"]

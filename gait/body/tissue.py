@@ -46,7 +46,7 @@ def passive_moments(body: Body, angle: NDArray) -> NDArray:
 
     `angle` (..., 4) [rad], flexion, dorsiflexion and toe up positive; the trunk is upright.
     """
-    return body.stiffness_scale * np.stack(tissue_moments(*np.moveaxis(angle, -1, 0)), -1)
+    return body.strength_scale * np.stack(tissue_moments(*np.moveaxis(angle, -1, 0)), -1)
 
 
 def tissue_moments(hip: Any, knee: Any, ankle: Any, toe: Any) -> Any:
@@ -93,7 +93,7 @@ def charged_calf_stiffness(
         stiffness, tissue: K of the whole ankle, and of its tissue [N m/rad].
         torque: of the calf [N m].
         tendon: stiffness of the tendon at 1.70 m and 63 kg [N m/rad].
-        scale: of stiffness, `Body.stiffness_scale`.
+        scale: of stiffness, `Body.strength_scale`.
         per_torque: rise of the calf's stiffness with its torque [1/rad].
     """
     # Calf and tendon alone: K may be below the tissue's, and the angles have moved on since it was bounded.

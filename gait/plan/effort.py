@@ -138,7 +138,7 @@ def muscle_use(
         delivered: (S, L, 4, 2) work of fibres and tendon on each joint in the two halves of the interval [J].
         tick: length of an interval [s].
         strength: (L, 4, 2) largest moments of each leg's muscles, extension and flexion [N m].
-        scale: of stiffness, `Body.stiffness_scale`.
+        scale: of stiffness, `Body.strength_scale`.
         muscle: factors on its properties.
     """
     # Intervals 1 to S - 2 have an interval before and one after: [:-2], [1:-1] and [2:] are before, they and after.
@@ -248,7 +248,7 @@ def effort_of_stride(
     # One leg, as an axis of length 1: its sums are doubled for both.
     moments, half = (_with_neighbours(values)[:, None] for values in (fibres, -fibres * rate * tick / 2))
     delivered = np.stack([half, half], -1)
-    use = muscle_use(moments, delivered, tick, strengths(body), body.stiffness_scale, muscle)
+    use = muscle_use(moments, delivered, tick, strengths(body), body.strength_scale, muscle)
     return Effort(
         work=float(2 * use.energy.sum() / (body.total_mass * GRAVITY * distance)),
         activation=float(2 * use.activation.sum() / stride_time),

@@ -5,7 +5,18 @@ import numpy as np
 import pytest
 
 from springfoot.envs.physics.contact import CONTACTS, contact_offsets, geom_name
-from springfoot.envs.physics.model import JOINTS, SIDES, build_model, build_spec, contact_material
+from springfoot.envs.physics.foot import LOCK
+from springfoot.envs.physics.model import (
+    ANKLE,
+    DAMPING_TIME,
+    JOINTS,
+    SIDES,
+    build_model,
+    build_spec,
+    contact_material,
+)
+from springfoot.envs.physics.timing import PHYSICS_STEP
+from springfoot.envs.settings.settings import BipedSettings
 from springfoot.gait.body.body import GRAVITY, Body
 
 BODIES = [Body(), Body(1.5, 45.0), Body(1.9, 100.0), Body(1.6, 70.0, 0.94, 1.07, 0.3)]
@@ -158,3 +169,29 @@ def test_at_rest_the_floor_carries_the_weight(body):
     assert np.abs(data.qacc).max() < 1e-3
     vertical = sum(data.sensor(f"force_{geom_name(contact, side)}").data[2] for side in SIDES for contact in CONTACTS)
     assert vertical == pytest.approx(body.mass * (1 + body.carried_ratio) * GRAVITY, rel=1e-3)
+
+
+def test_damped_springs_have_half_the_inertia_that_contacts_do_not_feel():
+    """Armature h K beta / 2 of devices, of a schedule's stiffest spring and of braces, but not of one-way ones."""
+    own = build_model(Body()).joint("ankle_right").armature[0]
+    share = 0.5 * PHYSICS_STEP
+    feet = {
+        "passive": ({"kind": "passive", "ankle_stiffness": 600.0}, share * 600.0 * DAMPING_TIME[ANKLE]),
+        "schedule": (
+            {"kind": "adaptive", "schedule": {"ankle": [[0.0, 300, 0], [0.5, 900, 0]], "toe": [[0.0, 50, 0]]}},
+            share * 900.0 * DAMPING_TIME[ANKLE],
+        ),
+        "brace": (
+            {"kind": "intact", "orthosis": {"ankle_stiffness": 500.0, "damping_time": 0.1}},
+            share * 500.0 * 0.1,
+        ),
+        "one-way brace": (
+            {"kind": "intact", "orthosis": {"ankle_stiffness": 500.0, "engages": "dorsiflexion"}},
+            0.0,
+        ),
+        "lock": ("rigid", LOCK.armature),
+    }
+    for name, (foot, added) in feet.items():
+        settings = BipedSettings(right_foot=foot)
+        model = build_model(Body(), feet=settings.feet)
+        assert model.joint("ankle_right").armature[0] == pytest.approx(own + added, rel=1e-12), name

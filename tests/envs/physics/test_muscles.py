@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 
 from springfoot.envs import Biped
+from springfoot.envs.physics.foot import SOUND
 from springfoot.envs.physics.model import ANKLE, JOINTS, RIGHT, SIDES, TOE, passive_damping
-from springfoot.envs.physics.muscles import leg_strengths
+from springfoot.envs.physics.muscles import leg_strengths, muscles_of
 from springfoot.envs.physics.timing import PHYSICS_STEP, PHYSICS_STEPS_PER_WINDOW
 from springfoot.envs.settings.settings import body_of, settings_from
 from springfoot.envs.task.reward import TERMS
@@ -195,3 +196,9 @@ def test_effort_per_kg_does_not_depend_on_mass_if_devices_scale_with_it():
     for name in ("fibre_J_kg_m", "net_joint_J_kg_m", "activation", "total"):
         assert other[name] == pytest.approx(own[name], rel=1e-5), name
     assert metabolic_energy(np.array([1.0, -1.2])) == pytest.approx([4.0, 1.0])
+
+
+def test_a_load_makes_no_muscle_tendon_or_tissue_other():
+    alone = muscles_of(Body(), SOUND)
+    loaded = muscles_of(Body(1.7, 63.0, 1.0, 1.0, 0.2), SOUND)
+    assert alone.tobytes() == loaded.tobytes()

@@ -7,9 +7,10 @@ from numpy.typing import NDArray
 
 from springfoot.envs.physics.contact import CONTACTS, geom_name
 from springfoot.envs.physics.measurement import Measurement, measure_bodies
-from springfoot.envs.physics.model import JOINTS, SIDES, damping_times, torque_limits
+from springfoot.envs.physics.model import JOINTS, SIDES, build_model, damping_times, torque_limits
 from springfoot.envs.physics.simulation import Simulation
 from springfoot.envs.physics.timing import PHYSICS_STEPS_PER_WINDOW
+from springfoot.errors import SpringfootError
 from springfoot.gait.body.body import Body
 
 LEGS = (len(SIDES), len(JOINTS))
@@ -142,3 +143,31 @@ def test_divergence_is_named(tmp_path, monkeypatch):
     assert mujoco.mjtWarning(int(m.diverged[1])).name.startswith("mjWARN_BAD")
     assert m.diverged[0] == m.diverged[2] == -1
     assert all(np.isfinite(getattr(m, name)).all() for name in ("com", "angle", "velocity", "force"))
+
+
+def test_a_custom_models_own_damping_and_limits_give_the_torques_of_its_joints():
+    model = build_model(Body())
+    for name in (f"{joint}_{side}" for side in SIDES for joint in JOINTS):
+        model.actuator(f"stiffness_{name}").gainprm[2] *= 2.0
+        model.jnt_actfrcrange[model.joint(name).id] *= 0.3
+    simulation = Simulation(Body(), 1, model=model)
+    simulation.reset(
+        np.arange(1), np.array([[0.0, 2.0, 0.0]]), np.zeros((1, 3)), np.full((1, *LEGS), 0.2), np.ones((1, *LEGS))
+    )
+    m = advance(simulation, np.full((1, *LEGS), 400.0), np.full((1, *LEGS), 30.0))
+    np.testing.assert_allclose(m.torque[0], simulation.data(0).qfrc_actuator[3:].reshape(LEGS), atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "message"),
+    [
+        ("timestep", 0.003, "a custom model's timestep must be a whole part of 0.01 s, got 0.003 s"),
+        ("timestep", 0.02, "a custom model's timestep must be a whole part of 0.01 s, got 0.02 s"),
+        ("integrator", mujoco.mjtIntegrator.mjINT_RK4, "a custom model's integrator must be Euler"),
+    ],
+)
+def test_a_custom_model_with_other_steps_is_refused(option, value, message):
+    model = build_model(Body())
+    setattr(model.opt, option, value)
+    with pytest.raises(SpringfootError, match=message):
+        Simulation(Body(), 1, model=model)

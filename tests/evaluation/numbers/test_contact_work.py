@@ -25,7 +25,7 @@ def walked(policy, given, episodes=2, seconds=8.0, step=PHYSICS_STEP, armature=N
     """The numbers of a walk with another physics step [s], or another armature of the right ankle's device [kg m^2]."""
     acting, settings = policy_and_settings(policy, {"episode_seconds": seconds, **given})
     left, right = settings.feet
-    if armature is not None:
+    if armature is not None and right.ankle.device is not None:
         ankle = replace(right.ankle, device=replace(right.ankle.device, armature=armature))
         right = replace(right, ankle=ankle)
     model = build_model(body_of(settings), settings.friction, (left, right))
