@@ -53,7 +53,7 @@ CURVE_LIMITS = {
 """Limits of each curve, and behind them the least and largest excursion and the least likeness of right curves. Chosen
 from the extremes of some 600 right ones: Bovi's people at 0.85 to 1.96 m/s, with habits drawn as in the tests, and
 walks here without a fall: 8 policies and springs at 0.6 to 1.8 m/s, on slopes of -5 to 5 deg, on all kinds of feet,
-legs tuned for sound feet and with legs searched for each, by people's curves or a plan."""
+with legs tuned for sound feet and with legs searched for each, by people's curves or a plan."""
 SMALL_MEANS_NOTHING = ("toe", "knee_moment", "hip_power", "knee_power", "ankle_power", "grf_forward")
 """Curves that are small in some walks; with a rigid ankle, which its power tells, the ankle's curves too."""
 ALONE = 1.65

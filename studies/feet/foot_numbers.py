@@ -4,7 +4,7 @@ from typing import Any
 
 from springfoot.evaluation.numbers import Gait, asymmetry, leg_numbers
 
-NAMES = (
+FOOT_NUMBERS = (
     *("falls", "speed_m_s", "push_off_J_kg", "sound_peak_bw", "step_asymmetry", "hip_work_J_kg_m", "fibre_J_kg_m"),
     *("effort", "ankle_range_deg", "toe_range_deg", "clearance_m"),
 )
@@ -13,7 +13,7 @@ again."""
 
 
 def numbers_of(gait: Gait) -> dict[str, float | None]:
-    """Return the numbers of an undisturbed walk, by `NAMES`; None for numbers without a stride.
+    """Return the numbers of an undisturbed walk, by `FOOT_NUMBERS`; None for numbers without a stride.
 
     The left foot is the sound one, the right one is examined.
     """

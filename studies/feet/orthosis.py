@@ -30,7 +30,7 @@ from springfoot.files.markdown import MISSING, table, text_of
 from ..base.intervals import share_interval
 from ..base.kept import Kept
 from ..base.study import Answer, OnProgress, WalkingStudy
-from .foot_numbers import NAMES, numbers_of
+from .foot_numbers import FOOT_NUMBERS, numbers_of
 from .walked_speeds import TWO_PRICES, Row, at_walked_speeds, rows_csv
 
 PER_DEG = 180.0 / np.pi
@@ -156,7 +156,7 @@ class Orthosis(WalkingStudy):
             return {"walks": [numbers_of(measure(recording)) for recording in recordings]}
 
         how = {**self.how, "threads": 0, "policy": self.policy, "seconds": self.seconds}
-        return kept.get([how, given, feet, NAMES], make)["walks"]
+        return kept.get([how, given, feet, FOOT_NUMBERS], make)["walks"]
 
 
 def _with_walked_speed(numbers: Mapping[str, Any]) -> dict[str, Any]:

@@ -263,7 +263,11 @@ def test_options_may_differ_between_environments_of_every_adapter():
             {"left_foot": {"kind": "drop", "orthosis": {"engages": "dorsiflexion"}}},
             "only where the feet of the settings",
         ),
-        ({}, {"left_foot": {"kind": "passive", "adapted": "passive"}}, "left_foot: adapted people are gone"),
+        (
+            {},
+            {"left_foot": {"kind": "passive", "adapted": "passive"}},
+            "reset option 'left_foot': adapted people are gone",
+        ),
     ],
 )
 def test_bad_options_are_refused_and_nothing_changes(settings, options, message):

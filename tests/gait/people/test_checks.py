@@ -186,7 +186,7 @@ WALKS = {
     "up a slope": ("schedule", {"slope_deg": 5.0}),
     "limping": ("schedule", {"right_foot": "rigid_toe", "speed": 0.8}),
     "on a passive foot": ("schedule", {"right_foot": "passive", "slope_deg": 4.0}),
-    "on a stiff foot": ("schedule", {"right_foot": {"kind": "passive", "ankle_stiffness": 3000}}),
+    "on a stiff foot": ("schedule", {"right_foot": {"kind": "passive", "ankle_stiffness": 1200}}),
 }
 
 

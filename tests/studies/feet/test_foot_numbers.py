@@ -6,7 +6,7 @@ from springfoot.evaluation.numbers.metrics import measure
 from springfoot.evaluation.numbers.per_leg import leg_numbers
 from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.evaluation.recording.recording import record, record_feet
-from springfoot.studies.feet.foot_numbers import NAMES, numbers_of
+from springfoot.studies.feet.foot_numbers import FOOT_NUMBERS, numbers_of
 
 SHORT = {"episode_seconds": 6.0}
 
@@ -15,7 +15,7 @@ def test_numbers_are_those_of_the_evaluation():
     acting, settings = policy_and_settings("pretrained", {**SHORT, "right_foot": "passive"})
     gait = measure(record(acting, settings, name="pretrained", episodes=2))
     own, legs = numbers_of(gait), gait.metrics["per_leg"]
-    assert set(own) == set(NAMES)
+    assert set(own) == set(FOOT_NUMBERS)
     assert own["sound_peak_bw"] == legs["left"]["vertical_max_mean_bw"]
     work = legs["right"]["joint_work_J_kg"]
     assert own["push_off_J_kg"] == work["ankle"]["positive"] + work["toe"]["positive"]
