@@ -16,7 +16,7 @@ from safetensors.numpy import save as to_safetensors
 
 from springfoot.errors import SpringfootError, quoted
 
-from .text_table import existing
+from .text_table import existing, read_bytes
 from .writing import write_atomically
 
 DIGEST = "sha256"
@@ -93,6 +93,11 @@ def read_tensors(
 def _text(header: Mapping[str, Any]) -> str:
     """Return a header as JSON; equal headers give equal text."""
     return json.dumps(header, sort_keys=True)
+
+
+def digest_of_file(path: Path) -> str:
+    """Return the SHA-256 digest of a file's bytes."""
+    return sha256(read_bytes(path, MOST_TENSOR_BYTES)).hexdigest()
 
 
 def digest_of(header: Mapping[str, Any], tensors: Mapping[str, np.ndarray]) -> str:

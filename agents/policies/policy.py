@@ -13,6 +13,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from springfoot.envs.batch.biped_batch import Biped
+from springfoot.envs.batch.learned_person import POLICY_ENTRIES
 from springfoot.envs.settings.settings import BipedSettings, settings_from, settings_to_json
 from springfoot.envs.task.mirror import Mirror, mirror_of
 from springfoot.errors import SpringfootError, perhaps, quoted
@@ -24,8 +25,6 @@ from .number_bounds import LARGEST_WEIGHT, require_bounded
 
 FORMAT_VERSION = 1
 """Version of the file layout; a reader refuses any other."""
-ENTRIES = frozenset({"format_version", "network", "settings", "fingerprint"})
-"""Entries of a policy's header."""
 
 
 VARIANCE_FLOOR = 1e-8
@@ -200,7 +199,7 @@ def read_policy(name: str | Path) -> Policy:
     format version, incomplete or not finite, or made for other spaces, another model or other legs than this version's.
     """
     path = find_policy(name)
-    header, tensors = read_tensors(path, "springfoot", "policy", ENTRIES)
+    header, tensors = read_tensors(path, "springfoot", "policy", POLICY_ENTRIES)
     if header.get("format_version") != FORMAT_VERSION:
         raise SpringfootError(
             f"{name} has policy format {header.get('format_version')!r}, this version reads {FORMAT_VERSION}"

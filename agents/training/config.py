@@ -143,7 +143,7 @@ DRAWN_BODIES = [
     {"leg_ratio": 1.05, "foot_ratio": 1.05},
 ]
 """Proportions and loads that a person learns to walk with."""
-PERSON = replace(
+PERSON_TASK = replace(
     TRAINED_ON,
     episode_seconds=5.0,  # bodies fall soon after the start or not at all, so starts are what has to be learned
     drawn_feet=DRAWN_FEET,
@@ -205,7 +205,7 @@ PRESETS: dict[str, TrainingConfig] = {
         hidden=(128, 128),
         mirrored=True,
         eval_interval=384_000,
-        environment=PERSON,
+        environment=PERSON_TASK,
     ),
 }
 """Name -> training that is known to work."""

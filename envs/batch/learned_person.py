@@ -5,7 +5,6 @@ acts by its mean action, on the observation without noise, told that others set 
 for any number of bodies: the bits do not depend on the batch.
 """
 
-from hashlib import sha256
 from math import radians, tanh
 from pathlib import Path
 from typing import Any
@@ -14,27 +13,30 @@ import numpy as np
 
 from springfoot.arrays import NDArray
 from springfoot.errors import SpringfootError
-from springfoot.files.tensor_file import read_tensors
+from springfoot.files.tensor_file import digest_of_file, read_tensors
 
 from ..physics.kernel import kernel
 from ..physics.model import ACTIONS, MOVED, PERSON_ACTIONS, SIDES
 from ..task.mirror import mirror_of
 from ..task.observation_entries import PERSON_OBSERVATION
 
-FOLDER = Path(__file__).parent / "persons"
+PERSONS_FOLDER = Path(__file__).parent / "persons"
 """Folder of the persons that come with the package."""
-LEARNED = {"learned": "learned-1"} | {name: name for name in (f"learned-{number}" for number in range(1, 6))}
-"""Name of a person of this package -> its file in `FOLDER`."""
-ENTRIES = frozenset({"format_version", "network", "settings", "fingerprint"})
+LEARNED = {"learned": "learned-1", "learned-1": "learned-1"}
+"""Name of a person of this package -> its file in `PERSONS_FOLDER`, without suffix. It comes from `springfoot train
+--preset person --seed 0`, before braces and locks had an armature (`envs.physics.model.armatures_of`)."""
+POLICY_ENTRIES = frozenset({"format_version", "network", "settings", "fingerprint"})
 """Entries of a policy's header."""
-NAMES = tuple(entry.name for entry in PERSON_OBSERVATION)
-_OF_STIFFNESS = np.array([NAMES.index(name) for name in ("own_stiffness", *(f"last_action_{a}" for a in ACTIONS))])
+PERSON_NAMES = tuple(entry.name for entry in PERSON_OBSERVATION)
+_OF_STIFFNESS = np.array(
+    [PERSON_NAMES.index(name) for name in ("own_stiffness", *(f"last_action_{a}" for a in ACTIONS))]
+)
 """Entries that are 0 where others set the stiffness."""
 
 
 def person_file(name: str) -> Path:
     """Return the file of a person, one of `LEARNED` or a path; raise `SpringfootError` if there is none."""
-    path = FOLDER / f"{LEARNED[name]}.safetensors" if name in LEARNED else Path(name)
+    path = PERSONS_FOLDER / f"{LEARNED[name]}.safetensors" if name in LEARNED else Path(name)
     if not path.is_file():
         known = ", ".join(repr(one) for one in ("tuned", *LEARNED) if one != name)
         raise SpringfootError(f"person must be one of {known}, or the file of a policy that is one, got {name!r}")
@@ -93,7 +95,7 @@ class LearnedPerson:
         if settings.get("guide", "people") != guide:
             raise SpringfootError(f"person {name!r} was trained with guide {settings.get('guide')!r}, not {guide!r}")
         self._scale = radians(settings["person_range_deg"])
-        mirror = mirror_of(NAMES, _action_names(settings))
+        mirror = mirror_of(PERSON_NAMES, _action_names(settings))
         layers = range(len(network["layer_sizes"]) - 1)
         clip = np.inf if network["observation_clip"] is None else float(network["observation_clip"])
         self._network = (
@@ -121,7 +123,7 @@ class LearnedPerson:
 
 def digest_of_person(name: str) -> str:
     """Return the SHA-256 digest of a person's file."""
-    return sha256(person_file(name).read_bytes()).hexdigest()
+    return digest_of_file(person_file(name))
 
 
 def _action_names(settings: dict[str, Any]) -> tuple[str, ...]:
@@ -131,7 +133,7 @@ def _action_names(settings: dict[str, Any]) -> tuple[str, ...]:
 
 def _read(path: Path) -> tuple[dict[str, Any], dict[str, Any], dict[str, NDArray]]:
     """Return network and settings of a person's header, and its tensors; raise `SpringfootError` for another file."""
-    header, tensors = read_tensors(path, "springfoot", "policy", ENTRIES)
+    header, tensors = read_tensors(path, "springfoot", "policy", POLICY_ENTRIES)
     network = header.get("network", {})
     settings = header.get("settings", {})
     fits = (
@@ -139,7 +141,7 @@ def _read(path: Path) -> tuple[dict[str, Any], dict[str, Any], dict[str, NDArray
         and network.get("mirrored") is True
         and network.get("activation") == "tanh"
         and network.get("output", "clip") == "clip"
-        and network["layer_sizes"][0] == len(NAMES)
+        and network["layer_sizes"][0] == len(PERSON_NAMES)
         and network["layer_sizes"][-1] == len(_action_names(settings)) // 2
     )
     if not fits:

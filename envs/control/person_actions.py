@@ -22,7 +22,7 @@ DRAWN_SOURCES = ("scaled", "constant", "random")
 
 
 def draw_source(settings: BipedSettings, random: np.random.Generator) -> tuple[int, int, int, NDArray]:
-    """Return the fields of `SOURCE` for one episode: who sets the stiffness, drawn if the setting says so.
+    """Return the fields of `STIFFNESS_SOURCE` for one episode: who sets the stiffness, drawn if the setting says so.
 
     Draws nothing for the sources "action" and "schedule".
     """

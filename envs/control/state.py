@@ -36,7 +36,7 @@ DECISION = np.dtype(
     ]
 )
 """The actions of one environment (`envs.control.decision_times`)."""
-SOURCE = np.dtype(
+STIFFNESS_SOURCE = np.dtype(
     [
         ("others", np.int64),  # 1 where others than the action set the stiffness
         ("scheduled", np.int64),  # then: 1 for a factor on the schedule, 0 for a stiffness within the ranges
@@ -122,7 +122,7 @@ CONTROL_ROW = np.dtype(
     [
         ("subject", SUBJECT),
         ("decision", DECISION),
-        ("source", SOURCE),
+        ("source", STIFFNESS_SOURCE),
         ("person", PERSON),
         ("feet", FOOT),
         ("springs", SPRING_STATE),

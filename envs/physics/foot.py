@@ -26,8 +26,8 @@ class Spring:
     """Angle without torque [rad]."""
     damping_time: float | None = None
     """Damping over stiffness [s]; None for that of the joint's muscles (`envs.physics.model.damping_times`)."""
-    armature: float = 0.0
-    """Inertia of the joint beside its own [kg m^2]; 0 for that of `envs.physics.model.armatures_of`."""
+    armature: float | None = None
+    """Inertia of the joint beside its own [kg m^2]; None for the usual one, of `envs.physics.model.armatures_of`."""
     table: tuple[tuple[float, float], ...] = ()
     """Angles [rad], ascending, and torques [N m], falling, in place of stiffness and rest angle; lines between them."""
     engages: str | None = None
@@ -51,14 +51,14 @@ class Spring:
         return lowest, highest
 
 
-LOCK = Spring(stiffness=50_000.0, damping_time=0.01, armature=0.2)
+LOCK = Spring(stiffness=50_000.0, damping_time=0.01)
 """Spring that locks a joint at 0: 100 N m, an ankle's largest moment in walking, move it by 0.1 deg. Chosen: with a
 damping time of five physics steps or more, moments are as with any stiffer or softer lock (5 000 to 100 000 N
 m/rad).
 
 MuJoCo solves contacts with the inertia M, and moves the joints by M + h K beta, h the physics step. Without an
-armature, contacts take a locked foot for a light one that swings freely, and give the body energy. Chosen: any armature
-from 0.1 to 5 kg m^2 gives the same walk to 2 %; below h K beta = 1 the moment still passes within a step."""
+armature (`envs.physics.model.armatures_of`), contacts take a locked foot for a light one that swings freely, and give
+the body energy. Any armature from 0.1 to 5 kg m^2 gives the same walk to 2 %."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -112,8 +112,8 @@ def springs_of(model: mujoco.MjModel) -> tuple[NDArray, NDArray]:
 def armatures_of(body: Body, feet: Feet) -> NDArray:
     """Return the armature of the joints of both legs [kg m^2], (side, joint): that of muscles, a device's, a brace's.
 
-    Damped springs without an armature of their own have h K beta / 2, h the physics step: as with `LOCK`, contacts
-    would else give the body energy.
+    Damped springs without an armature of their own have h K beta / 2, h the physics step: contacts would else give the
+    body energy, as with `envs.physics.foot.LOCK`.
     """
     armature = np.array(ARMATURE) * body.mass_scale * body.length_scale**2 + np.zeros((len(SIDES), len(JOINTS)))
     usual = damping_times(body)
@@ -125,7 +125,8 @@ def armatures_of(body: Body, feet: Feet) -> NDArray:
                     stiffest = max(
                         segment.stiffness for segment in (foot.schedule.ankle, foot.schedule.toe)[joint - ANKLE]
                     )
-                armature[side, joint] += device.armature or _inertia_for(device, stiffest, usual[joint])
+                own = device.armature
+                armature[side, joint] += _inertia_for(device, stiffest, usual[joint]) if own is None else own
             orthosis = described.orthosis
             if orthosis and not orthosis.engages:  # one-way springs have no damping
                 armature[side, joint] += _inertia_for(orthosis, orthosis.steepest, usual[joint])

@@ -57,7 +57,7 @@ TERMS: tuple[str, ...] = (
 )
 """Reward terms in the order of their sum: rewards, then costs."""
 ALIVE, SPEED, COM_X, COM_Z, ZMP, POSE, GRF, STIFFNESS_RATE, STIFFNESS, *_ = range(len(TERMS))
-EFFORT, FIBRE_WORK, ACTIVATION, IMPACT, SPEED_HELD, PERSON_RATE, ACCELERATION = range(STIFFNESS + 1, len(TERMS))
+EFFORT, FIBRE_WORK, ACTIVATION, IMPACT, SPEED_HELD, PERSON_RATE, SMOOTHNESS = range(STIFFNESS + 1, len(TERMS))
 TASK_OPTIONS = np.dtype(
     [
         ("weights", float, len(TERMS)),  # of the reward's terms
@@ -248,11 +248,11 @@ def judge(rows, controls, bodies, table, options, forces, terms) -> None:
         terms[i, FIBRE_WORK] = muscles.energy.sum() / (scale.weight * way)
         terms[i, ACTIVATION] = muscles.activation / options[0].seconds
         terms[i, IMPACT] = _impact(rows[i], forces, i, options[0].seconds)
-        terms[i, SPEED_HELD] = terms[i, PERSON_RATE] = terms[i, ACCELERATION] = 0.0
+        terms[i, SPEED_HELD] = terms[i, PERSON_RATE] = terms[i, SMOOTHNESS] = 0.0
         if terms[i, ALIVE] > 0.0:  # a body that diverged has no speeds
             held_speed = _mean_speed(rows[i], m, options[0].seconds)
             terms[i, SPEED_HELD] = abs(held_speed - control.subject.speed) / control.subject.speed
-            terms[i, ACCELERATION] = _acceleration(rows[i], m, options[0].seconds)
+            terms[i, SMOOTHNESS] = _acceleration(rows[i], m, options[0].seconds)
             person = control.person
             for side in range(2):
                 for joint in range(3):

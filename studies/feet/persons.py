@@ -27,7 +27,7 @@ from springfoot.files.writing import csv_text
 
 from ..base.study import Answer, OnProgress, WalkingStudy
 
-SPEEDS = (0.9, 1.0, 1.2, 1.4, 1.5)
+SOUND_SPEEDS = (0.9, 1.0, 1.2, 1.4, 1.5)
 """Commanded speeds on sound feet [m/s]."""
 FIRST_SEED = 50_000_000
 """Seed of the first drawn episode; trainings use others."""
@@ -121,7 +121,7 @@ class Persons(WalkingStudy):
     @property
     def total(self) -> float:
         """Simulated seconds without falls."""
-        sound = self.episodes * (len(SPEEDS) + len(SLOPES_DEG))
+        sound = self.episodes * (len(SOUND_SPEEDS) + len(SLOPES_DEG))
         return len(self.persons) * self.seconds * (2 * self.drawn + sound)
 
     def ask(self, progress: OnProgress) -> Answer:
@@ -144,7 +144,7 @@ class Persons(WalkingStudy):
                 push: walk_drawn(act, replace(ranges, push_newton=push), self.drawn, self.threads, progress)
                 for push in (0.0, PUSH_NEWTON)
             }
-            sound += [self.sound_walk(name, {"speed": speed}, progress) for speed in SPEEDS]
+            sound += [self.sound_walk(name, {"speed": speed}, progress) for speed in SOUND_SPEEDS]
             sound += [self.sound_walk(name, {"slope_deg": slope}, progress) for slope in SLOPES_DEG]
         files = {
             "drawn.csv": _drawn_csv(drawn),

@@ -151,7 +151,7 @@ OPTIONS = [
     (3, 'reset options must be a dictionary, got 3'),
     ([1], 'reset options must be a dictionary, got [1]'),
     ("x", "reset options must be a dictionary, got 'x'"),
-    ({"reset": 1}, "unknown reset option 'reset'; valid: start, height, mass, speed"),
+    ({"reset": 1}, "unknown reset option 'reset'; valid: start, height, mass, speed, body, left_foot, right_foot"),
     ({"start": np.ones(2)}, "start must be 'random', 'standing' or a stride phase in [0, 1), got array([1., 1.])"),
     ({"start": "lying"}, "start must be 'random', 'standing' or a stride phase in [0, 1), got 'lying'"),
     ({"start": 10**400}, "start must be 'random', 'standing' or a stride phase in [0, 1), got 100000000000000000000000000000000000000000000000000000000..."),
@@ -162,7 +162,7 @@ OPTIONS = [
     ({"mass": np.array("2020", "M8[Y]")}, "reset option 'mass' must be a number, or one for each of 1 environments, got array('2020', dtype='datetime64[Y]')"),
     ({"mass": [60, 70]}, "reset option 'mass' must be a number, or one for each of 1 environments, got [60, 70]"),
     ({"height": np.nan}, 'height must be in [1, 2.3] m, got nan'),
-    ({"a\x1b[31m": 1}, "unknown reset option 'a\\x1b[31m'; valid: start, height, mass, speed"),
+    ({"a\x1b[31m": 1}, "unknown reset option 'a\\x1b[31m'; valid: start, height, mass, speed, body, left_foot, right_foot"),
 ]
 SEEDS = [
     ("1", "seed must be a whole number >= 0 and <= 9223372036854775807, got '1'"),

@@ -8,7 +8,7 @@ import pytest
 from springfoot.agents.policies.fingerprint import fingerprint
 from springfoot.agents.policies.policy import Policy, save_policy
 from springfoot.envs.batch.biped_batch import Biped
-from springfoot.envs.batch.learned_person import NAMES, LearnedPerson
+from springfoot.envs.batch.learned_person import PERSON_NAMES, LearnedPerson
 from springfoot.envs.physics.model import ACTIONS
 from springfoot.envs.settings.settings import BipedSettings
 from springfoot.envs.task.mirror import mirror_of
@@ -59,7 +59,7 @@ def test_the_network_in_the_step_does_what_its_policy_does(file) -> None:
     outside = started(BOTH)
     observation = outside.observe()
     for _ in range(50):
-        observation[:, NAMES.index("own_stiffness")] = 0.0
+        observation[:, PERSON_NAMES.index("own_stiffness")] = 0.0
         expected = outside.step(policy(observation))
         result = inside.step(np.zeros((1, 4)))
         observation = expected.observation
@@ -70,9 +70,9 @@ def test_the_network_in_the_step_does_what_its_policy_does(file) -> None:
 
 
 def test_mirrored_bodies_have_mirrored_offsets_to_the_bit(file) -> None:
-    mirror = mirror_of(NAMES, ACTIONS)
+    mirror = mirror_of(PERSON_NAMES, ACTIONS)
     learned = LearnedPerson(file, "people")
-    observation = np.random.default_rng(1).standard_normal((20, len(NAMES))).astype(np.float32)
+    observation = np.random.default_rng(1).standard_normal((20, len(PERSON_NAMES))).astype(np.float32)
     everyone = np.ones(20, bool)
     offsets = learned.offsets(observation.copy(), everyone)
     image = learned.offsets(mirror.of(observation), everyone)

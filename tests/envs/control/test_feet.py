@@ -247,7 +247,9 @@ def test_the_energy_ledger_is_closed(foot):
     biped = Biped(settings_from(right_foot=foot), 3)
     ticks = walked_ticks(biped, 40)
     kept = [tick for tick in ticks if tick.active.all()]
-    energy = {name: np.stack([tick.work.energy[name] for tick in kept]) for name in LEDGER.names or ()}
+    # A device is let go at the angle of a sound foot; its first swing is faster than the physics step resolves.
+    settled = kept[5:]
+    energy = {name: np.stack([tick.work.energy[name] for tick in settled]) for name in LEDGER.names or ()}
     change = energy["mechanical"][-1] - energy["mechanical"][0]
     put_in = np.sum([energy[name][1:] for name in ("actuators", "passive_damping", "contact", "pushes")], 0)
     turned_over = np.sum([np.abs(energy[name][1:]).sum(0) for name in ("actuators", "contact")], 0)

@@ -8,7 +8,9 @@ import pytest
 
 from springfoot.envs.physics.energy import parts_of
 from springfoot.envs.physics.foot import INTACT, LOCK, Foot, leg_segments, total_mass
-from springfoot.envs.physics.model import ARMATURE, build_model
+from springfoot.envs.physics.model import ARMATURE, DAMPING_TIME, TOE, build_model
+from springfoot.envs.physics.timing import PHYSICS_STEP
+from springfoot.envs.settings.feet import RIGID_TOE_STIFFNESS
 from springfoot.envs.settings.settings import settings_from
 from springfoot.gait import Body
 
@@ -77,4 +79,7 @@ def test_the_ledger_knows_the_armature_of_a_lock():
     armature = parts_of(Body(), feet)["armature"][0]
     np.testing.assert_array_equal(armature, model.dof_armature[3:].reshape(2, 4))
     added = armature - ARMATURE
-    np.testing.assert_allclose(added, [[0, 0, 0, LOCK.armature], [0, 0, LOCK.armature, 0]], atol=1e-15)
+    share = 0.5 * PHYSICS_STEP
+    lock = share * LOCK.stiffness * (LOCK.damping_time or 0.0)
+    toe = share * RIGID_TOE_STIFFNESS * DAMPING_TIME[TOE]  # of the rigid foot's toe, a spring
+    np.testing.assert_allclose(added, [[0, 0, 0, lock], [0, 0, lock, toe]], rtol=1e-12, atol=1e-15)

@@ -189,7 +189,7 @@ def test_damped_springs_have_half_the_inertia_that_contacts_do_not_feel():
             {"kind": "intact", "orthosis": {"ankle_stiffness": 500.0, "engages": "dorsiflexion"}},
             0.0,
         ),
-        "lock": ("rigid", LOCK.armature),
+        "lock": ("rigid", share * LOCK.stiffness * (LOCK.damping_time or 0.0)),
     }
     for name, (foot, added) in feet.items():
         settings = BipedSettings(right_foot=foot)

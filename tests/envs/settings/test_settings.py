@@ -100,7 +100,7 @@ def test_every_setting_has_a_theme_and_every_theme_a_setting():
 def test_an_evaluation_sets_anew_who_walks_where_and_leaves_a_policy_its_springs_and_reward():
     kept = {"speed_rate", "episode_seconds", "push_seconds", "push_interval"}
     asked = {name for name, theme in THEME_OF.items() if theme in CONDITION_THEMES}
-    assert kept < asked and set(CONDITION_SETTINGS) == (asked - kept) | {"drawn_feet"}
+    assert kept < asked and set(CONDITION_SETTINGS) == (asked - kept) | {"drawn_feet", "stiffness_by"}
     assert all(getattr(BipedSettings(), name) is None for name in DRAWN_SETTINGS)
     assert set(DRAWN_SETTINGS) < set(CONDITION_SETTINGS)
 

@@ -23,7 +23,7 @@ from springfoot.gait.people.gait_events import PERCENT
 
 
 def walked(**feet):
-    policy, settings = policy_and_settings("schedule", {"episode_seconds": 6.0, **feet})
+    policy, settings = policy_and_settings("schedule", {"episode_seconds": 6.0, "person": "learned", **feet})
     return record(policy, settings, name="schedule", episodes=2, threads=1)
 
 
