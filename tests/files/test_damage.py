@@ -10,7 +10,7 @@ import pytest
 from safetensors import safe_open
 from safetensors.numpy import load, save
 
-from springfoot.agents.policies.policy import ENTRIES, read_policy
+from springfoot.agents.policies.policy import POLICY_ENTRIES, read_policy
 from springfoot.agents.training.checkpoint import STATE_KEY, newest_checkpoint, read_checkpoint
 from springfoot.agents.training.config import TrainingConfig
 from springfoot.agents.training.training import resume, train
@@ -96,7 +96,7 @@ POLICY = [
 
 @pytest.mark.parametrize(("name", "value", "said"), POLICY)
 def test_numbers_that_no_training_makes_are_refused_in_a_policy_whose_digest_fits(run, tmp_path, name, value, said):
-    header, tensors = read_tensors(run / "best.safetensors", "springfoot", "policy", ENTRIES)
+    header, tensors = read_tensors(run / "best.safetensors", "springfoot", "policy", POLICY_ENTRIES)
     path = _forged(tmp_path / "forged.safetensors", "springfoot", header, tensors, name, value)
     with pytest.raises(SpringfootError) as caught:
         read_policy(path)
@@ -105,7 +105,7 @@ def test_numbers_that_no_training_makes_are_refused_in_a_policy_whose_digest_fit
 
 @pytest.mark.parametrize("clip", [float("inf"), 1e300, 0.0, -1.0])
 def test_a_clip_that_clips_nothing_or_all_is_refused(run, tmp_path, clip):
-    header, tensors = read_tensors(run / "best.safetensors", "springfoot", "policy", ENTRIES)
+    header, tensors = read_tensors(run / "best.safetensors", "springfoot", "policy", POLICY_ENTRIES)
     header["network"]["observation_clip"] = clip
     text = json.dumps({"springfoot": json.dumps(header)})  # JSON proper has no infinity: a digest cannot be written
     path = tmp_path / "forged.safetensors"
