@@ -17,6 +17,7 @@ from springfoot.agents.training.checkpoint import STATE_KEY, read_checkpoint
 from springfoot.agents.training.config import TrainingConfig, config_to_json
 from springfoot.agents.training.run_record import read_record
 from springfoot.arrays import NDArray
+from springfoot.envs.batch.learned_person import PERSON_NAMES, POLICY_ENTRIES, LearnedPerson, person_file
 from springfoot.envs.control.constants import constants_from
 from springfoot.envs.control.reference_walk import reference_walks
 from springfoot.envs.settings.settings import BipedSettings, settings_from, settings_to_json
@@ -63,6 +64,7 @@ def readers(folder: Path) -> dict[str, Reader]:
         "policy": Reader(
             read=_walk_on, suffix=".safetensors", bases=(_policy(), find_policy("pretrained").read_bytes())
         ),
+        "person": Reader(read=_person, suffix=".safetensors", bases=(_person_file(),)),
         "training state": Reader(read=_state, suffix=".safetensors", bases=(_state_file(),)),
         "header of a checkpoint": Reader(read=_checkpoint, suffix=".json", bases=(json.dumps(_header()).encode(),)),
         "record of a run": Reader(read=_record, suffix=".json", bases=(json.dumps(_run()).encode(),)),
@@ -107,6 +109,19 @@ def _write(path: Path, content: bytes) -> Path:
 
 
 # Policies, states, records -----------------------------------------------------------------------------------
+
+
+def _person_file() -> bytes:
+    header, tensors = read_tensors(person_file("learned"), "springfoot", "policy", POLICY_ENTRIES)
+    return save(tensors, {"springfoot": json.dumps(header)})  # without a digest
+
+
+def _person(path: Path) -> None:
+    """Read a person and let it act."""
+    person = LearnedPerson(str(path), "people")
+    offsets = person.offsets(np.ones((2, len(PERSON_NAMES)), np.float32), np.ones(2, bool))
+    if not np.isfinite(offsets).all():
+        raise ValueError("offsets must be finite")
 
 
 def _policy() -> bytes:

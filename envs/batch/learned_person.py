@@ -5,6 +5,7 @@ acts by its mean action, on the observation without noise, told that others set 
 for any number of bodies: the bits do not depend on the batch.
 """
 
+from itertools import pairwise
 from math import radians, tanh
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from springfoot.files.tensor_file import digest_of_file, read_tensors
 
 from ..physics.kernel import kernel
 from ..physics.model import ACTIONS, MOVED, PERSON_ACTIONS, SIDES
+from ..settings.settings import FARTHEST_OFFSET_DEG
 from ..task.mirror import mirror_of
 from ..task.observation_entries import PERSON_OBSERVATION
 
@@ -28,6 +30,9 @@ LEARNED = {"learned": "learned-1", "learned-1": "learned-1"}
 POLICY_ENTRIES = frozenset({"format_version", "network", "settings", "fingerprint"})
 """Entries of a policy's header."""
 PERSON_NAMES = tuple(entry.name for entry in PERSON_OBSERVATION)
+LARGEST_OF_PERSON = 1e6
+"""Largest magnitude of a person's numbers [-], but for variances: those of entries that never varied are larger;
+chosen: sums of products stay finite."""
 _OF_STIFFNESS = np.array(
     [PERSON_NAMES.index(name) for name in ("own_stiffness", *(f"last_action_{a}" for a in ACTIONS))]
 )
@@ -134,18 +139,40 @@ def _action_names(settings: dict[str, Any]) -> tuple[str, ...]:
 def _read(path: Path) -> tuple[dict[str, Any], dict[str, Any], dict[str, NDArray]]:
     """Return network and settings of a person's header, and its tensors; raise `SpringfootError` for another file."""
     header, tensors = read_tensors(path, "springfoot", "policy", POLICY_ENTRIES)
-    network = header.get("network", {})
-    settings = header.get("settings", {})
-    fits = (
-        settings.get("acts") in ("both", "person")
-        and network.get("mirrored") is True
-        and network.get("activation") == "tanh"
-        and network.get("output", "clip") == "clip"
-        and network["layer_sizes"][0] == len(PERSON_NAMES)
-        and network["layer_sizes"][-1] == len(_action_names(settings)) // 2
-    )
+    try:
+        network = header["network"]
+        settings = header["settings"]
+        fits = _is_person(network, settings, tensors)
+    except (KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError):
+        fits = False
     if not fits:
         raise SpringfootError(
             f"{path} is no person: it must be a mirrored policy of tanh layers, trained with acts 'both' or 'person'"
         )
     return network, settings, tensors
+
+
+def _is_person(network: dict[str, Any], settings: dict[str, Any], tensors: dict[str, NDArray]) -> bool:
+    """Return True if network, settings and tensors are those of a person, with numbers within bounds.
+
+    Raises an exception of Python's for entries that are missing or of another type.
+    """
+    sizes = network["layer_sizes"]
+    ends = [len(PERSON_NAMES), len(_action_names(settings)) // 2]
+    shapes = {"observation.mean": (sizes[0],), "observation.variance": (sizes[0],)}
+    for layer, (inputs, outputs) in enumerate(pairwise(sizes)):
+        shapes |= {f"layer.{layer}.weight": (outputs, inputs), f"layer.{layer}.bias": (outputs,)}
+    clip = network["observation_clip"]
+    return (
+        settings["acts"] in ("both", "person")
+        and network["mirrored"] is True
+        and network["activation"] == "tanh"
+        and network.get("output", "clip") == "clip"
+        and [sizes[0], sizes[-1]] == ends
+        and {name: tensor.shape for name, tensor in tensors.items()} == shapes
+        and all(np.abs(tensors[name]).max() <= LARGEST_OF_PERSON for name in shapes if name != "observation.variance")
+        and tensors["observation.variance"].min() >= 0.0
+        and 0.0 < float(network["variance_floor"]) <= LARGEST_OF_PERSON
+        and (clip is None or 0.0 < float(clip) <= LARGEST_OF_PERSON)
+        and 0.0 <= float(settings["person_range_deg"]) <= FARTHEST_OFFSET_DEG
+    )

@@ -1,6 +1,7 @@
 """Read the tuned constants of the leg controller (`envs.control.legs`): committed sets, interpolated over speed."""
 
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, fields
 from functools import cache
@@ -144,11 +145,10 @@ def leg_constants(
 
 
 def _sets(table: Mapping[str, Any], name: str) -> dict[float, LegConstants]:
-    """Return speed [m/s] -> constants of every set in `table` with the name "`name`" or "`name`, SPEED m/s"."""
-    prefix = f"{name}, "
-    unit = " m/s"
-    with_speed = [key for key in table if key.startswith(prefix) and key.endswith(unit)]
-    names = {TUNED_SPEED: name} | {float(key.removeprefix(prefix).removesuffix(unit)): key for key in with_speed}
+    """Return speed [m/s] -> constants: of the set `name` at `TUNED_SPEED`, and of each set "NAME, SPEED m/s" of that
+    name at its speed."""
+    at_speeds = [re.fullmatch(rf"{re.escape(name)}, ([\d.]+) m/s", key) for key in table]
+    names = {TUNED_SPEED: name} | {float(match[1]): match[0] for match in at_speeds if match}
     return {
         require_within("speed", speed, PLAN_SPEED_RANGE, "m/s"): constants_from(table[name_at_speed])
         for speed, name_at_speed in names.items()

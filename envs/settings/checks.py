@@ -115,7 +115,7 @@ def check_choice(name: str, value: Any, choices: tuple[str, ...]) -> None:
 
 
 def check_range(name: str, value: Any, unit: str) -> None:
-    """Refuse other values than a pair 0 < low < high."""
+    """Refuse any value but a tuple (low, high) of finite numbers with 0 < low < high."""
     numbers = isinstance(value, tuple) and len(value) == 2 and all(map(is_number, value))
     if not numbers or not 0 < value[0] < value[1]:
         raise SpringfootError(f"{name} must be (low, high) with 0 < low < high {unit}, got {quoted(value)}")

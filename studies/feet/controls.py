@@ -74,7 +74,7 @@ class Controls(WalkingStudy):
 
     @property
     def total(self) -> float:
-        """Simulated seconds without falls."""
+        """Return the simulated time of all walks if none falls [s]."""
         return len(CONTROLS) * len(self._asked()) * self.episodes * self.seconds
 
     def ask(self, progress: OnProgress) -> Answer:
@@ -91,7 +91,8 @@ class Controls(WalkingStudy):
         )
 
     def walk(self, given: Mapping[str, Any], progress: OnProgress = lambda seconds: None) -> dict[str, float | None]:
-        """Return falls, walked speed and prices of one condition at one commanded speed."""
+        """Return the share of episodes that fall, walked speed and prices of one condition at one commanded speed; None
+        where they cannot be measured."""
         act, settings = policy_and_settings(self.policy, {**given, "episode_seconds": self.seconds})
         metrics = measure(record(act, settings, name=self.policy, progress=progress, **self.how)).metrics
         effort = metrics["effort"]

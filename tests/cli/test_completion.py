@@ -60,7 +60,7 @@ def test_the_scripts_offer_policies_and_flags_and_no_word_of_a_description(shell
         assert all(re.fullmatch(r"--?[\w-]+", word) for word in {*words} - names)
         assert offered(command, "pretr") == ["pretrained"]
     assert all(word.startswith("-") for word in offered("train", ""))
-    assert offered("train", "--preset", "") == ["walk", "any-body", "predict"]
+    assert offered("train", "--preset", "") == ["walk", "any-body", "predict", "person"]
 
 
 @pytest.mark.parametrize("words", [[], ["fish"], ["tcsh"], ["bash", "zsh"]])
