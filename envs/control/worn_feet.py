@@ -43,7 +43,8 @@ class WornFeet:
     ) -> list[FootPair]:
         """Draw the feet of K environments from their generators; return what replaces the environments' own.
 
-        `given` has K feet in place of drawn ones, by the names of `FOOT_SETTINGS`, checked or in plain JSON values.
+        `given` has K feet in place of drawn ones, by the names of `FOOT_SETTINGS`, checked or in plain JSON.
+        Feet are drawn there too, so that what is drawn next does not depend on `given`.
         """
         chosen = [self.chosen(name, (given or {}).get(name, [None] * len(randoms))) for name in FOOT_SETTINGS]
         replaced = []

@@ -321,7 +321,7 @@ class BipedSettings:
         require_number("speed_rate", self.speed_rate, 0.0, unit="m/s^2", above=True)
 
     def _check_person(self) -> None:
-        """Raise `SpringfootError` for settings of a person that do not go together."""
+        """Raise `SpringfootError` for `person`, `acts`, `stiffness_by` and `decisions` that do not go together."""
         require_number("person_range_deg", self.person_range_deg, 0.0, FARTHEST_OFFSET_DEG, unit="deg")
         if not isinstance(self.person, str) or not self.person:
             raise SpringfootError(f"person must be 'tuned' or the name of a policy file, got {quoted(self.person)}")

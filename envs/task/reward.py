@@ -321,7 +321,10 @@ class Task:
             self.rows["worn"][index] = worn_entries(body, self._feet[index])
 
     def reset(self, ids: NDArray, velocity: NDArray) -> None:
-        """Begin an episode of bodies `ids` (K,), whose joints move at `velocity` (N, side, joint) [rad/s]."""
+        """Begin an episode of bodies `ids` (K,), with the commanded speed for a mean.
+
+        `velocity` (N, side, joint) is that of the joints of all bodies [rad/s]; rows `ids` are read.
+        """
         self.rows["steps"][ids] = 0
         self.rows["force"][ids] = 0.0
         self.rows["mean_speed"][ids] = self._subjects.speed[ids]
