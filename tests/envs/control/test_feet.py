@@ -242,14 +242,21 @@ def test_a_spring_that_is_always_taut_is_one_that_acts_both_ways_without_damping
     np.testing.assert_allclose(one_way, both_ways, atol=1e-8)
 
 
-@pytest.mark.parametrize("foot", FEET_SEEN, ids=named)
+LET_GO = pytest.mark.xfail(
+    strict=True,
+    reason="misses 2.24 J where 2.20 J is allowed, 1.21 J in the first 10 ms: a passive foot is let go at the angle "
+    "of a sound one, and swings faster than the physics step resolves",
+)
+
+
+@pytest.mark.parametrize(
+    "foot", [pytest.param(foot, marks=LET_GO) if foot == "passive" else foot for foot in FEET_SEEN], ids=named
+)
 def test_the_energy_ledger_is_closed(foot):
     biped = Biped(settings_from(right_foot=foot), 3)
     ticks = walked_ticks(biped, 40)
     kept = [tick for tick in ticks if tick.active.all()]
-    # A device is let go at the angle of a sound foot; its first swing is faster than the physics step resolves.
-    settled = kept[5:]
-    energy = {name: np.stack([tick.work.energy[name] for tick in settled]) for name in LEDGER.names or ()}
+    energy = {name: np.stack([tick.work.energy[name] for tick in kept]) for name in LEDGER.names or ()}
     change = energy["mechanical"][-1] - energy["mechanical"][0]
     put_in = np.sum([energy[name][1:] for name in ("actuators", "passive_damping", "contact", "pushes")], 0)
     turned_over = np.sum([np.abs(energy[name][1:]).sum(0) for name in ("actuators", "contact")], 0)
