@@ -80,3 +80,10 @@ def test_half_the_physics_step_gives_the_same_walk(policy, given):
         work = [(each if leg is None else each["per_leg"][leg])["joint_work_J_kg"] for each in (coarse, fine)]
         push_off = [each["ankle"]["positive"] + each["toe"]["positive"] for each in work]
         assert push_off[0] == pytest.approx(push_off[1], rel=0.05, abs=0.005)
+
+
+def test_the_ground_gives_a_rigid_foot_nothing():
+    """Of a locked ankle, on which the tuned walk falls and a learned person walks."""
+    metrics = walked("schedule", {"right_foot": "rigid", "person": "learned"})
+    assert metrics["falls"] == 0
+    assert metrics["energy_J_kg"]["contact"] < 0.0
