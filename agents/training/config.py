@@ -102,30 +102,31 @@ PREDICTED = replace(
 """Task of a body that follows its own plan: the action is a factor on the schedule found with its leg constants. The
 reward pays for CoM, speed and ZMP of the plan and charges effort; angles and forces do not count."""
 
-DRAWN_FEET = [
+_BRACE = {"ankle_stiffness": [20, 520], "ankle_deg": [-8, 4]}
+_ONE_WAY = _BRACE | {"engages": "dorsiflexion"}
+_HEAVIER = {"shank_mass_ratio": [1.0, 1.3], "foot_mass_ratio": [1.0, 2.0]}
+_WEAK = {"kind": "weak", "strength": [0.15, 0.6]}
+DRAWN_FEET: list[dict[str, Any]] = [
     {"foot": "intact", "on": "both", "weight": 30},
-    {"foot": {"kind": "intact", "orthosis": {"ankle_stiffness": [20, 520]}}, "on": "both", "weight": 12},
-    {"foot": {"kind": "intact", "orthosis": {"ankle_stiffness": [20, 520]}}, "weight": 3},
+    {"foot": {"kind": "intact", "orthosis": _BRACE}, "on": "both", "weight": 8},
+    {"foot": {"kind": "intact", "orthosis": _BRACE} | _HEAVIER, "on": "both", "weight": 4},
+    {"foot": {"kind": "intact", "orthosis": _BRACE}, "weight": 3},
+    {"foot": {"kind": "intact", "orthosis": _ONE_WAY}, "on": "both", "weight": 4},
+    {"foot": {"kind": "intact", "orthosis": _ONE_WAY} | _HEAVIER, "on": "both", "weight": 3},
+    {"foot": {"kind": "intact", "orthosis": {"toe_stiffness": [10, 180]}}, "on": "both", "weight": 3},
+    {"foot": {"kind": "intact"} | _HEAVIER, "on": "both", "weight": 4},
+    {"foot": _WEAK, "weight": 3},
+    {"foot": _WEAK, "on": "both", "weight": 5},
+    {"foot": _WEAK | {"orthosis": _BRACE}, "on": "both", "weight": 6},
+    {"foot": _WEAK | {"orthosis": _BRACE}, "weight": 3},
     {
-        "foot": {"kind": "intact", "orthosis": {"ankle_stiffness": [20, 520], "engages": "dorsiflexion"}},
-        "on": "both",
-        "weight": 5,
-    },
-    {
-        "foot": {"kind": "intact", "foot_mass_ratio": [0.8, 2.0], "shank_mass_ratio": [0.9, 1.3]},
-        "on": "both",
-        "weight": 4,
-    },
-    {"foot": {"kind": "weak", "strength": [0.15, 0.6]}, "weight": 3},
-    {"foot": {"kind": "weak", "strength": [0.15, 0.6]}, "on": "both", "weight": 5},
-    {
-        "foot": {"kind": "weak", "strength": [0.15, 0.6], "orthosis": {"ankle_stiffness": [20, 520]}},
-        "on": "both",
-        "weight": 6,
-    },
-    {"foot": {"kind": "weak", "strength": [0.15, 0.6], "orthosis": {"ankle_stiffness": [20, 520]}}, "weight": 3},
-    {
-        "foot": {"kind": "passive", "ankle_stiffness": [150, 1500], "ankle_deg": [0, 8], "toe_stiffness": [15, 110]},
+        "foot": {
+            "kind": "passive",
+            "ankle_stiffness": [150, 1500],
+            "ankle_deg": [0, 8],
+            "toe_stiffness": [15, 200],
+            "shank_mass_ratio": [0.6, 1.1],
+        },
         "weight": 16,
     },
     {"foot": {"kind": "adaptive", "ankle_deg": [0, 8]}, "weight": 5},
@@ -133,6 +134,7 @@ DRAWN_FEET = [
     {"foot": "rigid_toe", "weight": 2},
     {"foot": "no_toe", "weight": 2},
     {"foot": "drop", "weight": 4},
+    {"foot": {"kind": "drop", "orthosis": {"ankle_stiffness": [20, 120], "ankle_deg": [0, 10]}}, "weight": 2},
 ]
 """Feet that a person learns to walk on; sound ones come often enough, as the person's walk on them is the measure."""
 DRAWN_BODIES = [
@@ -152,7 +154,7 @@ PERSON_TASK = replace(
     action_mode="residual",
     stiffness_by="drawn",
     ankle_tendon=400.0,
-    push_newton=80.0,
+    push_newton=120.0,
     height_range=(1.5, 1.9),
     mass_range=(50.0, 90.0),
     speed_range=(0.8, 1.6),

@@ -16,6 +16,8 @@ from ..physics.simulation import Simulation
 
 START_PHASES = (0.08, 0.38)
 """Range of stride phases of both legs at a random start; chosen: near double support bodies fall."""
+_SWINGS_FROM = 0.6
+"""Stride phase from which a leg swings, about that of toe-off."""
 START_DEPTH = 0.001
 """Initial depth of the lowest contact point in the floor [m at 1.70 m]; chosen, about the depth under body weight."""
 
@@ -37,11 +39,18 @@ def walking_posture(
     leg.
 
     `table` comes from `start_table`. Returns joint angles, those of the hips to the vertical, and their rates, (K,
-    side, joint) each [rad, rad/s]; trunk pitch (K,) [rad]; commanded speed (K,) [m/s].
+    side, joint) each [rad, rad/s]; trunk pitch (K,) [rad]; commanded speed (K,) [m/s]. A device with a rest angle hangs
+    at it on the leg that swings: let go elsewhere, a stiff and light foot would strike back.
     """
-    curves = table.at(leg_phases(left_phase), subjects.place[ids])  # (K, side, 9) as `_start_curves`; the last, pitch
+    phase = leg_phases(left_phase)
+    curves = table.at(phase, subjects.place[ids])  # (K, side, 9) as `_start_curves`; the last, pitch
     angle, velocity = np.split(curves[..., :-1], 2, axis=-1)
-    return angle, velocity / subjects.scale[ids]["time"][:, None, None], curves[:, 0, -1], subjects.speed[ids]
+    velocity = velocity / subjects.scale[ids]["time"][:, None, None]
+    feet = subjects.rows["feet"][ids]
+    hangs = (feet["rests"] > 0) & (phase > _SWINGS_FROM)[..., None]
+    angle[..., ANKLE:] = np.where(hangs, feet["rest"], angle[..., ANKLE:])
+    velocity[..., ANKLE:] = np.where(hangs, 0.0, velocity[..., ANKLE:])
+    return angle, velocity, curves[:, 0, -1], subjects.speed[ids]
 
 
 def place(
