@@ -16,13 +16,23 @@ MADE = {
         "walk",
     ),
     "predicted": ("Walks by a plan that knows no person's curves.", "springfoot study predict", "prediction"),
+    "learned": (
+        "Moves hips, knees and ankles too, on any foot, body, speed and slope that the training drew.",
+        "springfoot train --preset person",
+        "feet",
+    ),
 }
 """Policy -> purpose, the command that made it, and the page of its results."""
-SHARED_LIMITS = (
-    "One planar body in simulation; a stiffness that walks here is none for a patient's foot. Slopes, loads and other "
-    "bodies were not trained: measure them first (`springfoot study compare --world`)."
-)
+SHARED_LIMITS = "One planar body in simulation; a stiffness that walks here is none for a patient's foot."
 """Limits of every policy that comes with the package."""
+ONE_BODY = " Slopes, loads and other bodies were not trained: measure them first (`springfoot study compare --world`)."
+"""Further limits of those that were trained on one body."""
+ACTED_ON = {
+    "stiffness": "four stiffnesses",
+    "person": "six rest angles",
+    "both": "four stiffnesses and six rest angles",
+}
+"""Setting `acts` -> the actions in words."""
 
 
 def policy_card(name: str) -> str:
@@ -41,9 +51,9 @@ def policy_card(name: str) -> str:
     lines = [
         f"made by: `{command}`",
         f"results and falls: docs/results/{page}.md",
-        f"network: {layers}, {policy.activation}{legs}; observations to four stiffnesses",
+        f"network: {layers}, {policy.activation}{legs}; observations to {ACTED_ON[policy.settings.acts]}",
         f"settings of its training, where not the defaults: {differences or 'none'}",
-        f"limits: {SHARED_LIMITS}",
+        f"limits: {SHARED_LIMITS}{'' if policy.settings.drawn_bodies else ONE_BODY}",
         f"SHA-256: `{sha256(read_bytes(find_policy(name))).hexdigest()}`",
     ]
     return "\n- ".join([f"**{name}.** {purpose}\n", *lines])

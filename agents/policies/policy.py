@@ -13,7 +13,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from springfoot.envs.batch.biped_batch import Biped
-from springfoot.envs.batch.learned_person import POLICY_ENTRIES
+from springfoot.envs.batch.learned_person import POLICY_ENTRIES, person_file
 from springfoot.envs.settings.settings import BipedSettings, settings_from, settings_to_json
 from springfoot.envs.task.mirror import Mirror, mirror_of
 from springfoot.errors import SpringfootError, perhaps, quoted
@@ -45,8 +45,14 @@ Output = Literal["clip", "tanh"]
 
 BEST, LAST = "best.safetensors", "last.safetensors"
 """Names of a run folder's policies: the one with the highest return in periodic evaluation, and the newest."""
-SHIPPED = {"pretrained": "walk.safetensors", "medium": "medium.safetensors", "predicted": "predicted.safetensors"}
-"""Name of a policy of this package -> its file in `pretrained/`; `policy_card` describes each."""
+_PRETRAINED = Path(str(resources.files("springfoot.agents"))) / "pretrained"
+SHIPPED = {
+    "pretrained": _PRETRAINED / "walk.safetensors",
+    "medium": _PRETRAINED / "medium.safetensors",
+    "predicted": _PRETRAINED / "predicted.safetensors",
+    "learned": person_file("learned"),
+}
+"""Name of a policy of this package -> its file; `policy_card` describes each."""
 PRETRAINED_BY = "python train.py --push-newton 250 --timesteps 14000000 --out runs/pretrained"
 """Command that made `pretrained` from nothing."""
 RUN = "run.json"
@@ -161,7 +167,7 @@ def find_policy(name: str | Path) -> Path:
     """
     path = Path(name)
     if str(name) in SHIPPED:
-        path = Path(str(resources.files("springfoot.agents") / "pretrained")) / SHIPPED[str(name)]
+        path = SHIPPED[str(name)]
         if not path.is_file():
             raise SpringfootError(f"this installation of springfoot has no {name} policy; train one: train.py")
     elif path.is_dir():

@@ -134,7 +134,7 @@ DRAWN_FEET: list[dict[str, Any]] = [
     {"foot": "rigid_toe", "weight": 2},
     {"foot": "no_toe", "weight": 2},
     {"foot": "drop", "weight": 4},
-    {"foot": {"kind": "drop", "orthosis": {"ankle_stiffness": [20, 120], "ankle_deg": [0, 10]}}, "weight": 2},
+    {"foot": {"kind": "drop", "orthosis": {"ankle_stiffness": [0.3, 60], "ankle_deg": [0, 10]}}, "weight": 6},
 ]
 """Feet that a person learns to walk on; sound ones come often enough, as the person's walk on them is the measure."""
 DRAWN_BODIES = [
@@ -154,7 +154,7 @@ PERSON_TASK = replace(
     action_mode="residual",
     stiffness_by="drawn",
     ankle_tendon=400.0,
-    push_newton=120.0,
+    push_newton=80.0,
     height_range=(1.5, 1.9),
     mass_range=(50.0, 90.0),
     speed_range=(0.8, 1.6),
@@ -173,7 +173,7 @@ PERSON_TASK = replace(
         "fibre_work": -2.0,
         "activation": -0.3,
         "impact": -0.3,
-        "speed_held": -6.0,
+        "speed_held": -10.0,
         "person_rate": -0.03,
     },
 )
@@ -199,7 +199,7 @@ PRESETS: dict[str, TrainingConfig] = {
     ),
     "predict": TrainingConfig(timesteps=500_000, environment=PREDICTED),
     "person": TrainingConfig(
-        timesteps=7_000_000,
+        timesteps=14_000_000,
         num_envs=120,
         update_steps=7680,
         epochs=5,

@@ -1,16 +1,23 @@
 """Hold the price of a walk against conditions whose answer is known: the controls that come before patients.
 
     springfoot study controls
+    springfoot study controls learned
 
-One sound person walks whom nobody adapts: legs and the schedule of stiffness stay. A device that does nothing must cost
-nothing, and one that takes over a part of what a tendon gives back must not look like a saving. Conditions are compared
-where all walk equally fast (`walked_speeds`), under both prices.
+With the policy `schedule` one sound person walks whom nobody adapts; a learned person adapts to each condition. A
+device that does nothing must cost nothing, and one that takes over a part of what a tendon gives back must not look
+like a large saving. Conditions are compared where all walk equally fast (`walked_speeds`), under both prices.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from itertools import product
+from typing import Annotated, Any, ClassVar
 
+import numpy as np
+import tyro
+
+from springfoot.envs import BipedSettings
+from springfoot.envs.settings import body_of
 from springfoot.evaluation.numbers import measure
 from springfoot.evaluation.recording import policy_and_settings, record
 from springfoot.files.markdown import MISSING, table, text_of
@@ -23,8 +30,7 @@ ASKED_SPEEDS = (0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6)
 WALKED_SPEEDS = (0.8, 1.0, 1.2)
 """Walked speeds at which prices are compared [m/s]."""
 UNCHANGED = "sound"
-SLACK = "slack device, both ankles"
-STIFFEST = "spring 500 N·m/rad, right ankle"
+STIFFEST = "500 N·m/rad, right ankle"
 """The condition whose spring once "saved" 13 %, when net joint work was the price."""
 
 
@@ -38,18 +44,57 @@ def _both(foot: dict[str, Any]) -> dict[str, Any]:
     return {"left_foot": foot, "right_foot": foot}
 
 
-BOTH_ANKLES = (50.0, 100.0, 150.0, 250.0, 500.0)
-"""Stiffness of springs at both ankles [N m/rad]: those of Nuckols & Sawicki (2020), and twice their stiffest."""
-CONTROLS: dict[str, dict[str, Any]] = {
+BOTH_ANKLES = (0.0, 50.0, 100.0, 150.0, 250.0, 350.0, 500.0)
+"""Stiffness of springs at both ankles [N m/rad]: a slack device, those of Nuckols & Sawicki (2020), and up to twice
+their stiffest."""
+DEVICE_KG = 0.45
+"""Mass of an exoskeleton at one ankle [kg], spread over the shank: 0.41 to 0.50 kg (Collins et al. 2015, Nature
+522:212)."""
+_SHANK_RATIO = 1.0 + DEVICE_KG / body_of(BipedSettings()).shank_mass
+WITH_MASS = {"shank_mass_ratio": _SHANK_RATIO, "shank_inertia_ratio": _SHANK_RATIO}
+"""Numbers of a foot below a shank that bears the device's mass."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Springs:
+    """Springs at both ankles, of rising stiffness."""
+
+    name: str
+    """Name of a condition without its stiffness."""
+    against: str
+    """Condition to compare with."""
+    settings: Mapping[float, Mapping[str, Any]]
+    """Stiffness [N m/rad] -> settings that differ from the sound walk."""
+
+    @property
+    def conditions(self) -> dict[float, str]:
+        """Return stiffness -> name of the condition."""
+        return {k: f"{f'{k:g} N·m/rad' if k else 'slack'}, {self.name}" for k in self.settings}
+
+
+SPRINGS = (
+    Springs(
+        name="both ankles",
+        against=UNCHANGED,
+        settings={k: _both(_brace(ankle_stiffness=k)) for k in BOTH_ANKLES},
+    ),
+    Springs(
+        name=f"both ankles, {DEVICE_KG:g} kg each",
+        against=UNCHANGED,
+        settings={k: _both(_brace(ankle_stiffness=k) | WITH_MASS) for k in BOTH_ANKLES},
+    ),
+    Springs(
+        name="both ankles, one-way",
+        against="slack, both ankles, one-way",
+        settings={
+            k: _both(_brace(ankle_stiffness=k, ankle_deg=-5.73, engages="dorsiflexion")) for k in BOTH_ANKLES[:5]
+        },
+    ),
+)
+"""Springs whose best stiffness and saving are told."""
+CONTROLS: dict[str, Mapping[str, Any]] = {
     UNCHANGED: {},
-    SLACK: _both(_brace(ankle_stiffness=0.0)),
-    **{f"spring {k:g} N·m/rad, both ankles": _both(_brace(ankle_stiffness=k)) for k in BOTH_ANKLES},
-    **{
-        f"one-way spring {k:g} N·m/rad, both ankles": _both(
-            _brace(ankle_stiffness=k, ankle_deg=-5.73, engages="dorsiflexion")
-        )
-        for k in BOTH_ANKLES[:4]
-    },
+    **{springs.conditions[k]: given for springs in SPRINGS for k, given in springs.settings.items()},
     STIFFEST: {"right_foot": _brace(ankle_stiffness=500.0)},
     "feet of twice the mass": _both({"kind": "intact", "foot_mass_ratio": 2.0, "foot_inertia_ratio": 2.0}),
     "20 % of body weight on the back": {"carried_ratio": 0.2},
@@ -67,34 +112,42 @@ class Controls(WalkingStudy):
     """Episodes of each condition and commanded speed."""
     seconds: float = 12.0
     """Length of each episode."""
-    policy: str = "schedule"
-    """Policy that sets the stiffness of both feet; the schedule reacts to nothing."""
+    policies: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="POLICY ...")] = ("schedule",)
+    """Policies to walk with; the schedule of stiffness reacts to nothing."""
 
     QUICK: ClassVar[Mapping[str, Any]] = {"episodes": 1, "seconds": 6.0}
 
     @property
     def total(self) -> float:
         """Return the simulated time of all walks if none falls [s]."""
-        return len(CONTROLS) * len(self._asked()) * self.episodes * self.seconds
+        return len(self.policies) * len(CONTROLS) * len(self._asked()) * self.episodes * self.seconds
 
     def ask(self, progress: OnProgress) -> Answer:
-        """Walk under every condition."""
+        """Walk with every policy under every condition."""
         walks = [
-            {"condition": name, "speed_m_s": speed, **self.walk({**given, "speed": speed}, progress)}
+            {
+                "policy": policy,
+                "condition": name,
+                "speed_m_s": speed,
+                **self.walk(policy, {**given, "speed": speed}, progress),
+            }
+            for policy in self.policies
             for name, given in CONTROLS.items()
             for speed in self._asked()
         ]
-        even = at_walked_speeds(walks, ("condition",), (0.9,) if self.quick else WALKED_SPEEDS)
-        files = {"walks.csv": rows_csv(walks), "equal_speeds.csv": rows_csv(even)}
-        return Answer(
-            text=f"{controls_table(even)}\n\n{self.what_ran} of each condition and commanded speed.", files=files
-        )
+        even = at_walked_speeds(walks, ("policy", "condition"), (0.9,) if self.quick else WALKED_SPEEDS)
+        best = best_springs(even)
+        files = {"walks.csv": rows_csv(walks), "equal_speeds.csv": rows_csv(even), "best_springs.csv": rows_csv(best)}
+        how = f"{self.what_ran} of each condition and commanded speed; policies {', '.join(self.policies)}."
+        return Answer(text=f"{controls_table(even)}\n\n{best_table(best)}\n\n{how}", files=files)
 
-    def walk(self, given: Mapping[str, Any], progress: OnProgress = lambda seconds: None) -> dict[str, float | None]:
+    def walk(
+        self, policy: str, given: Mapping[str, Any], progress: OnProgress = lambda seconds: None
+    ) -> dict[str, float | None]:
         """Return the share of episodes that fall, walked speed and prices of one condition at one commanded speed; None
         where they cannot be measured."""
-        act, settings = policy_and_settings(self.policy, {**given, "episode_seconds": self.seconds})
-        metrics = measure(record(act, settings, name=self.policy, progress=progress, **self.how)).metrics
+        act, settings = policy_and_settings(policy, {**given, "episode_seconds": self.seconds})
+        metrics = measure(record(act, settings, name=policy, progress=progress, **self.how)).metrics
         effort = metrics["effort"]
         return {
             "falls": metrics["falls"] / metrics["episodes"],
@@ -108,25 +161,105 @@ class Controls(WalkingStudy):
         return (0.8, 1.0, 1.2) if self.quick else ASKED_SPEEDS
 
 
+def _prices(even: Sequence[Row]) -> dict[tuple[str, str, float], Row]:
+    """Return (policy, condition, speed) -> row of `at_walked_speeds`."""
+    return {(row["policy"], row["condition"], row["speed_m_s"]): row for row in even}
+
+
 def controls_table(even: Sequence[Row]) -> str:
     """Return the Markdown table of prices at equal walked speeds, with their differences from the sound walk.
 
-    `even` are rows of `at_walked_speeds`.
+    `even` are rows of `at_walked_speeds`. Of several policies it has the means, and of the differences the range.
     """
-    speeds = list(dict.fromkeys(row["speed_m_s"] for row in even))
-    prices = {(row["condition"], row["speed_m_s"]): row for row in even}
+    prices = _prices(even)
+    policies, conditions, speeds = (list(dict.fromkeys(names)) for names in zip(*prices, strict=True))
     lines = []
-    for name in dict.fromkeys(row["condition"] for row in even):
-        cells = [_cell(prices[name, speed], prices[UNCHANGED, speed]) for speed in speeds]
-        lines.append([name, *cells])
+    for name in conditions:
+        walks = [[(prices[who, name, at], prices[who, UNCHANGED, at]) for who in policies] for at in speeds]
+        lines.append([name, *map(_cell, walks)])
     head = ["", *(f"walking {speed:g} m/s" for speed in speeds)]
     return f"{table(head, lines)}\n\nFibre work [J/kg/m] / all of effort [-], in brackets against the sound walk."
 
 
-def _cell(own: Row, sound: Row) -> str:
-    """Return both prices of a walk with their differences from the sound one."""
-    if own[TWO_PRICES[0]] is None or sound[TWO_PRICES[0]] is None:
+def _cell(pairs: Sequence[tuple[Row, Row]]) -> str:
+    """Return both mean prices of a condition with their differences from the sound walk, for each policy a pair (own,
+    sound); a dash if any has none."""
+    if any(row[price] is None for pair in pairs for row in pair for price in TWO_PRICES):
         return MISSING
-    differences = [own[price] / sound[price] - 1.0 for price in TWO_PRICES]
-    shown = " / ".join(text_of(own[price], ".2f") for price in TWO_PRICES)
-    return f"{shown} ({differences[0]:+.0%} / {differences[1]:+.0%})"
+    shown = []
+    differences = []
+    for price in TWO_PRICES:
+        changes = [own[price] / sound[price] - 1.0 for own, sound in pairs]
+        shown.append(text_of(float(np.mean([own[price] for own, _ in pairs])), ".2f"))
+        ends = list(dict.fromkeys(f"{change:+.0%}" for change in (min(changes), max(changes))))
+        differences.append(" to ".join(ends))
+    return f"{' / '.join(shown)} ({' / '.join(differences)})"
+
+
+def best_springs(even: Sequence[Row]) -> list[dict[str, Any]]:
+    """Return the best stiffness [N m/rad] of each of `SPRINGS` and its saving, for each policy, price and walked speed.
+
+    The best is the lowest point of the parabola through the cheapest stiffness and its neighbours; the first or the
+    last one that was walked if that is the cheapest. The saving is a share of the price that it is compared with, > 0
+    if the spring is cheaper. None where nobody walks.
+    """
+    prices = _prices(even)
+    policies, _, speeds = (list(dict.fromkeys(names)) for names in zip(*prices, strict=True))
+    rows = []
+    for who, springs, at, price in product(policies, SPRINGS, speeds, TWO_PRICES):
+        without = prices[who, springs.against, at][price]
+        walked = {k: prices[who, name, at][price] for k, name in springs.conditions.items()}
+        best, least = _lowest({k: value for k, value in walked.items() if value is not None})
+        saving = None if least is None or without is None else 1.0 - least / without
+        named = {"policy": who, "springs": springs.name, "speed_m_s": at, "price": price}
+        rows.append({**named, "best_N_m_rad": best, "saving": saving})
+    return rows
+
+
+def _lowest(walked: Mapping[float, float]) -> tuple[float | None, float | None]:
+    """Return the stiffness with the least price, and that price, as `best_springs` says; None for no stiffness.
+
+    `walked` are prices by rising stiffness.
+    """
+    if not walked:
+        return None, None
+    stiffness = list(walked)
+    cheapest = min(walked, key=lambda k: walked[k])
+    index = stiffness.index(cheapest)
+    around = stiffness[max(index - 1, 0) : index + 2]
+    if len(around) < 3:
+        return cheapest, walked[cheapest]
+    parabola = np.poly1d(np.polyfit(around, [walked[k] for k in around], 2))
+    best = float(-parabola.c[1] / (2.0 * parabola.c[0]))
+    return best, float(parabola(best))
+
+
+def best_table(best: Sequence[Row]) -> str:
+    """Return the Markdown table of the best springs and their savings of fibre work; of several policies the ranges.
+
+    `best` are rows of `best_springs`.
+    """
+    speeds = list(dict.fromkeys(row["speed_m_s"] for row in best))
+    lines = []
+    for springs in SPRINGS:
+        line = [springs.name, springs.against]
+        for speed in speeds:
+            rows = [
+                row
+                for row in best
+                if (row["springs"], row["speed_m_s"], row["price"]) == (springs.name, speed, TWO_PRICES[0])
+            ]
+            line.append(_span(rows))
+        lines.append(line)
+    return table(["best spring: N·m/rad, saving", "against", *(f"walking {speed:g} m/s" for speed in speeds)], lines)
+
+
+def _span(rows: Sequence[Row]) -> str:
+    """Return the least and largest best stiffness and saving of rows of `best_springs`."""
+    if any(row["saving"] is None for row in rows):
+        return MISSING
+    ends = []
+    for column, form in (("best_N_m_rad", ".0f"), ("saving", ".0%")):
+        values = [row[column] for row in rows]
+        ends.append(" to ".join(dict.fromkeys(format(value, form) for value in (min(values), max(values)))))
+    return ", ".join(ends)

@@ -6,13 +6,13 @@ import pytest
 
 from springfoot.agents import policy_card, read_policy
 from springfoot.agents.policies import SHIPPED, find_policy
+from springfoot.envs.batch.learned_person import PERSONS_FOLDER
 from springfoot.errors import SpringfootError
 
 
 def test_every_shipped_file_has_a_name():
-    folder = find_policy("pretrained").parent
-    named = {str(find_policy(name).relative_to(folder)) for name in SHIPPED}
-    assert named == {str(path.relative_to(folder)) for path in folder.rglob("*.safetensors")} and len(named) == 3
+    folders = find_policy("pretrained").parent, PERSONS_FOLDER
+    assert {find_policy(name) for name in SHIPPED} == {path for folder in folders for path in folder.iterdir()}
 
 
 @pytest.mark.parametrize("name", SHIPPED)
@@ -20,11 +20,12 @@ def test_each_loads_by_name_and_has_a_card(name):
     policy = read_policy(name)
     card = policy_card(name)
     assert card.startswith(f"**{name}.** ") and sha256(find_policy(name).read_bytes()).hexdigest() in card
-    assert f"network: 43 - 64 - 64 - 4, {policy.activation}; " in card
+    layers = "80 - 128 - 128 - 5, tanh, for each leg, the right one's mirrored"
+    assert f"network: {layers if name == 'learned' else f'43 - 64 - 64 - 4, {policy.activation}'}; " in card
 
 
 def test_another_name_has_no_card():
     with pytest.raises(
-        SpringfootError, match=r"no policy 'mine' in the package; there are pretrained, medium, predicted$"
+        SpringfootError, match=r"no policy 'mine' in the package; there are pretrained, medium, predicted, learned$"
     ):
         policy_card("mine")

@@ -242,16 +242,7 @@ def test_a_spring_that_is_always_taut_is_one_that_acts_both_ways_without_damping
     np.testing.assert_allclose(one_way, both_ways, atol=1e-8)
 
 
-LET_GO = pytest.mark.xfail(
-    strict=True,
-    reason="misses 2.24 J where 2.20 J is allowed, 1.21 J in the first 10 ms: a passive foot is let go at the angle "
-    "of a sound one, and swings faster than the physics step resolves",
-)
-
-
-@pytest.mark.parametrize(
-    "foot", [pytest.param(foot, marks=LET_GO) if foot == "passive" else foot for foot in FEET_SEEN], ids=named
-)
+@pytest.mark.parametrize("foot", FEET_SEEN, ids=named)
 def test_the_energy_ledger_is_closed(foot):
     biped = Biped(settings_from(right_foot=foot), 3)
     ticks = walked_ticks(biped, 40)
