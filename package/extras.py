@@ -31,6 +31,8 @@ EXTRA_OF = {
     "viser": "live",
 }
 """Name in an import statement -> extra."""
+_INSTALLED_AS = {"rsl_rl": "rsl-rl-lib", "sb3_contrib": "sb3-contrib"}
+"""Name in an import statement -> name to install, of packages in no extra, where they differ."""
 
 
 @contextmanager
@@ -62,4 +64,6 @@ def missing(package: str, extra: str = "") -> str:
     """Return the message on a missing package, with the command that installs it: `extra` or else its own extra of
     springfoot, and the package itself if it is in none."""
     extra = extra or EXTRA_OF.get(package, "")
-    return f"the package {package} is missing: pip install " + (f"'springfoot[{extra}]'" if extra else package)
+    return f"the package {package} is missing: pip install " + (
+        f"'springfoot[{extra}]'" if extra else _INSTALLED_AS.get(package, package)
+    )

@@ -4,13 +4,17 @@ python examples/learners/cleanrl_ppo.py --out cleanrl.safetensors     (tried wit
 """
 
 import gymnasium as gym
-import torch
-import tyro
 from gymnasium.wrappers.vector import NormalizeObservation, TransformReward
-from torch import nn
-from torch.distributions import Normal
 
-from springfoot.agents import policy_from_mlp, save_policy
+from springfoot.extras import exiting_if_missing
+
+with exiting_if_missing():
+    import torch
+    import tyro
+    from torch import nn
+    from torch.distributions import Normal
+
+    from springfoot.agents import policy_from_mlp, save_policy
 
 TASK = {"episode_seconds": 10.0, "push_newton": 150.0}
 ENVS, STEPS, GAMMA = 64, 32, 0.98

@@ -4,14 +4,18 @@ python examples/learners/rsl_rl_ppo.py --out rsl_rl.safetensors     (tried with 
 """
 
 import gymnasium as gym
-import torch
-import tyro
-from rsl_rl.env import VecEnv
-from rsl_rl.runners import OnPolicyRunner
-from tensordict import TensorDict
-from torch import nn
 
-from springfoot.agents import policy_from_mlp, save_policy
+from springfoot.extras import exiting_if_missing
+
+with exiting_if_missing():
+    import torch
+    import tyro
+    from rsl_rl.env import VecEnv
+    from rsl_rl.runners import OnPolicyRunner
+    from tensordict import TensorDict
+    from torch import nn
+
+    from springfoot.agents import policy_from_mlp, save_policy
 
 ID, TASK = "springfoot.envs:SegmentedFootBiped-v0", {"episode_seconds": 10.0, "push_newton": 150.0}
 

@@ -7,11 +7,14 @@ Tried with stable-baselines3 2.9.2 and sb3-contrib 2.9.2.
 from importlib import import_module
 from typing import Any, Literal
 
-import torch
-import tyro
-from stable_baselines3.common.vec_env import VecNormalize
+from springfoot.extras import exiting_if_missing
 
-from springfoot.agents import SegmentedFootBipedVecEnv, policy_from_sb3, save_policy
+with exiting_if_missing():
+    import torch
+    import tyro
+    from stable_baselines3.common.vec_env import VecNormalize
+
+    from springfoot.agents import SegmentedFootBipedVecEnv, policy_from_sb3, save_policy
 
 TASK: dict[str, Any] = {"episode_seconds": 10.0, "push_newton": 150.0}
 NETWORK = {"net_arch": [64, 64], "activation_fn": torch.nn.Tanh}
@@ -25,7 +28,8 @@ def main(
 ) -> None:
     """Train, and write the deterministic action as a policy file."""
     torch.set_num_threads(1)
-    library = import_module("sb3_contrib" if algorithm == "tqc" else "stable_baselines3")
+    with exiting_if_missing():
+        library = import_module("sb3_contrib" if algorithm == "tqc" else "stable_baselines3")
     envs = VecNormalize(SegmentedFootBipedVecEnv(64 if algorithm == "ppo" else 16, **TASK), gamma=0.98)
     own: dict[str, Any] = {"learning_starts": 2000, "gradient_steps": 4, "policy_kwargs": NETWORK}
     if algorithm == "ppo":

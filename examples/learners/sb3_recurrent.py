@@ -10,13 +10,17 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-import torch
-import tyro
-from safetensors.torch import load_file, save_file
-from sb3_contrib import RecurrentPPO
-from stable_baselines3.common.vec_env import VecNormalize
 
-from springfoot.agents import SegmentedFootBipedVecEnv
+from springfoot.extras import exiting_if_missing
+
+with exiting_if_missing():
+    import torch
+    import tyro
+    from safetensors.torch import load_file, save_file
+    from sb3_contrib import RecurrentPPO
+    from stable_baselines3.common.vec_env import VecNormalize
+
+    from springfoot.agents import SegmentedFootBipedVecEnv
 
 HOW: dict[str, Any] = {"n_steps": 64, "batch_size": 256, "n_epochs": 4, "learning_rate": 1e-3, "gamma": 0.98}
 NETWORK = {"net_arch": [64], "lstm_hidden_size": 32, "log_std_init": -0.9}

@@ -1,18 +1,22 @@
 """PPO of skrl, tried with skrl 2.1.1: `python examples/learners/skrl_ppo.py --out skrl.safetensors`."""
 
 import gymnasium as gym
-import torch
-import tyro
-from skrl.agents.torch.ppo import PPO
-from skrl.envs.wrappers.torch import wrap_env
-from skrl.memories.torch import RandomMemory
-from skrl.models.torch import DeterministicMixin, GaussianMixin, Model
-from skrl.resources.preprocessors.torch import RunningStandardScaler
-from skrl.trainers.torch import SequentialTrainer
-from skrl.utils import set_seed
-from torch import nn
 
-from springfoot.agents import policy_from_mlp, save_policy
+from springfoot.extras import exiting_if_missing
+
+with exiting_if_missing():
+    import torch
+    import tyro
+    from skrl.agents.torch.ppo import PPO
+    from skrl.envs.wrappers.torch import wrap_env
+    from skrl.memories.torch import RandomMemory
+    from skrl.models.torch import DeterministicMixin, GaussianMixin, Model
+    from skrl.resources.preprocessors.torch import RunningStandardScaler
+    from skrl.trainers.torch import SequentialTrainer
+    from skrl.utils import set_seed
+    from torch import nn
+
+    from springfoot.agents import policy_from_mlp, save_policy
 
 ID, TASK = "springfoot.envs:SegmentedFootBiped-v0", {"episode_seconds": 10.0, "push_newton": 150.0}
 

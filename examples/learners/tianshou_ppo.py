@@ -5,20 +5,24 @@ python examples/learners/tianshou_ppo.py --out tianshou.safetensors     (tried w
 
 import gymnasium as gym
 import numpy as np
-import torch
-import tyro
-from tianshou.algorithm import PPO
-from tianshou.algorithm.modelfree.reinforce import ProbabilisticActorPolicy
-from tianshou.algorithm.optim import AdamOptimizerFactory
-from tianshou.data import Collector, VectorReplayBuffer
-from tianshou.env import DummyVectorEnv, VectorEnvNormObs
-from tianshou.trainer import OnPolicyTrainerParams
-from tianshou.utils.net.common import Net
-from tianshou.utils.net.continuous import ContinuousActorProbabilistic, ContinuousCritic
-from torch import nn
-from torch.distributions import Independent, Normal
 
-from springfoot.agents import policy_from_mlp, save_policy
+from springfoot.extras import exiting_if_missing
+
+with exiting_if_missing():
+    import torch
+    import tyro
+    from tianshou.algorithm import PPO
+    from tianshou.algorithm.modelfree.reinforce import ProbabilisticActorPolicy
+    from tianshou.algorithm.optim import AdamOptimizerFactory
+    from tianshou.data import Collector, VectorReplayBuffer
+    from tianshou.env import DummyVectorEnv, VectorEnvNormObs
+    from tianshou.trainer import OnPolicyTrainerParams
+    from tianshou.utils.net.common import Net
+    from tianshou.utils.net.continuous import ContinuousActorProbabilistic, ContinuousCritic
+    from torch import nn
+    from torch.distributions import Independent, Normal
+
+    from springfoot.agents import policy_from_mlp, save_policy
 
 ID, TASK = "springfoot.envs:SegmentedFootBiped-v0", {"episode_seconds": 10.0, "push_newton": 150.0}
 

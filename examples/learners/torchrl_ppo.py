@@ -6,17 +6,21 @@ python examples/learners/torchrl_ppo.py --out torchrl.safetensors     (tried wit
 from typing import Literal
 
 import gymnasium as gym
-import torch
-import tyro
-from tensordict.nn import AddStateIndependentNormalScale, TensorDictModule
-from torch import nn
-from torchrl.collectors import Collector
-from torchrl.envs import Compose, GymEnv, GymWrapper, RewardScaling, TransformedEnv, VecNormV2
-from torchrl.modules import IndependentNormal, ProbabilisticActor, ValueOperator
-from torchrl.objectives import ClipPPOLoss
-from torchrl.objectives.value import GAE
 
-from springfoot.agents import policy_from_mlp, save_policy
+from springfoot.extras import exiting_if_missing
+
+with exiting_if_missing():
+    import torch
+    import tyro
+    from tensordict.nn import AddStateIndependentNormalScale, TensorDictModule
+    from torch import nn
+    from torchrl.collectors import Collector
+    from torchrl.envs import Compose, GymEnv, GymWrapper, RewardScaling, TransformedEnv, VecNormV2
+    from torchrl.modules import IndependentNormal, ProbabilisticActor, ValueOperator
+    from torchrl.objectives import ClipPPOLoss
+    from torchrl.objectives.value import GAE
+
+    from springfoot.agents import policy_from_mlp, save_policy
 
 ID, TASK = "springfoot.envs:SegmentedFootBiped-v0", {"episode_seconds": 10.0, "push_newton": 150.0}
 Face = Literal["vector", "GymEnv", "GymWrapper"]

@@ -3,6 +3,7 @@
 import ast
 import json
 import re
+import runpy
 import subprocess
 import sys
 from importlib import import_module
@@ -127,3 +128,23 @@ def test_example_does_what_it_says(name, tmp_path, monkeypatch):
     if name == "plot_schedule.py":
         with Image.open(tmp_path / "schedule.png") as picture:
             assert len(picture.convert("RGB").getcolors(1 << 20) or []) > 50  # curves, no blank page
+
+
+@pytest.mark.parametrize(
+    ("library", "learner", "installed_as"),
+    [
+        ("rsl_rl", "rsl_rl_ppo", "rsl-rl-lib"),
+        ("sb3_contrib", "sb3_recurrent", "sb3-contrib"),
+        ("skrl", "skrl_ppo", "skrl"),
+        ("tianshou", "tianshou_ppo", "tianshou"),
+        ("tensordict", "torchrl_ppo", "tensordict"),
+    ],
+)
+def test_a_learner_without_its_library_says_how_to_install_it(library, learner, installed_as, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, library, None)  # as if it were not there
+    monkeypatch.setattr(sys, "argv", [f"{learner}.py"])
+    with pytest.raises(SystemExit) as ended:
+        runpy.run_path(str(EXAMPLES / "learners" / f"{learner}.py"), run_name="__main__")
+    assert ended.value.code == 2
+    wanted = f"{learner}.py: error: the package {library} is missing: pip install {installed_as}\n"
+    assert capsys.readouterr().err == wanted
