@@ -64,6 +64,10 @@ STUDIES = {
     "controls": ("feet.controls.Controls", "Does the price of a walk hold where its answer is known?"),
     "price": ("feet.price.Price", "How much does the price of a walk change with its tendons?"),
     "persons": ("feet.persons.Persons", "How do learned persons walk on drawn bodies and feet, and beside people?"),
+    "foot-map": (
+        "feet.foot_map.FootMap",
+        "Which feet does a learned person walk on, and what is it worth to know them?",
+    ),
     "orthosis": ("feet.orthosis.Orthosis", "Which spring beside the ankle helps a weak calf, and which a drop foot?"),
     "play": ("walks.play.Play", "What does a stiffness do to a walk? A recorded page to play with."),
 }

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 from springfoot.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from .foot import INTACT, Feet, Spring
+    from .foot import INTACT, SOUND, Feet, Spring
     from .model import ANKLE, JOINT_RANGE_DEG, JOINTS, LEFT, RIGHT, SIDES, damping_times
     from .timing import ACTION_STEP
 
@@ -18,6 +18,7 @@ __all__ = [
     "LEFT",
     "RIGHT",
     "SIDES",
+    "SOUND",
     "Feet",
     "Spring",
     "damping_times",
@@ -35,6 +36,7 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
             "LEFT": "model",
             "RIGHT": "model",
             "SIDES": "model",
+            "SOUND": "foot",
             "Feet": "foot",
             "Spring": "foot",
             "damping_times": "model",

@@ -1,0 +1,171 @@
+"""Walk learned persons on a map of right feet, told the truth and told that the foot is sound, and on ankles of one
+stiffness.
+
+    springfoot study foot-map learned
+
+The difference between the two walks on a foot is the worth of knowing it; the stiffness of the moment stays true in
+both. With ankles of one stiffness the person does not set the stiffness, and is told so.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+import tyro
+
+from springfoot.agents.policies import PolicyFunction, find_policy
+from springfoot.arrays import NDArray
+from springfoot.envs import BipedSettings
+from springfoot.envs.physics import SOUND
+from springfoot.envs.settings import body_of
+from springfoot.envs.task import PERSON_OBSERVATION, WORN, worn_entries
+from springfoot.errors import SpringfootError, require_number
+from springfoot.evaluation.numbers import measure
+from springfoot.evaluation.recording import policy_and_settings, record, record_feet
+from springfoot.files.markdown import MISSING, table, text_of
+
+from ..base.study import Answer, OnProgress, WalkingStudy
+from .foot_numbers import numbers_of
+from .walked_speeds import Row, rows_csv
+
+Foot = str | dict[str, Any]
+PASSIVE = [
+    {"kind": "passive", "ankle_stiffness": k, "ankle_deg": rest, "toe_stiffness": toe}
+    for k, rest, toe in product((150.0, 250.0, 400.0, 600.0, 1000.0, 1500.0), (0.0, 4.0, 8.0), (20.0, 60.0))
+]
+"""Passive feet: six ankles, three rest angles, two toes."""
+FEET: dict[str, list[Foot]] = {
+    "sound": ["intact"],
+    "calf of 25 %": [{"kind": "weak", "strength": 0.25}],
+    "sound, braced by 200 N·m/rad": [{"kind": "intact", "orthosis": {"ankle_stiffness": 200.0}}],
+    "36 passive feet": list(PASSIVE),
+    "adaptive": ["adaptive"],
+    "rigid": ["rigid"],
+    "toe locked": ["rigid_toe"],
+    "one piece": ["no_toe"],
+    "drop foot": ["drop"],
+    "drop foot, braced by 10 N·m/rad at 5°": [
+        {"kind": "drop", "orthosis": {"ankle_stiffness": 10.0, "ankle_deg": 5.0}},
+    ],
+}
+"""Name of a group -> its right feet."""
+FLAT = (50.0, 100.0, 200.0, 300.0, 400.0, 600.0)
+"""Stiffness of both ankles, in stance and swing [N m/rad]."""
+FLAT_TOE = 40.0
+"""Stiffness of both toes with it [N m/rad], that of the baseline `constant`."""
+SOUND_FOOT = "a sound foot"
+TOLD = ("the truth", SOUND_FOOT)
+"""Words on the foot that the person is told."""
+
+
+def told_sound(act: PolicyFunction, settings: BipedSettings) -> PolicyFunction:
+    """Return the policy as it acts if the observation says that both feet are sound."""
+    names = [entry.name for entry in PERSON_OBSERVATION]
+    first = len(names) - WORN
+    sound = worn_entries(body_of(settings), SOUND)
+
+    def acting(observation: NDArray) -> NDArray:
+        told = observation.copy()
+        told[..., first:] = sound
+        return act(told)
+
+    return acting
+
+
+@dataclass(frozen=True, kw_only=True)
+class FootMap(WalkingStudy):
+    """Walk learned persons on a map of feet, told the truth and told that the foot is sound."""
+
+    persons: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="PERSON ...")] = ("learned",)
+    """Policies that move the person: run folders, files, or `learned`."""
+    speed: float = 1.2
+    """Commanded speed [m/s]."""
+
+    QUICK: ClassVar = {"episodes": 1, "seconds": 6.0}
+
+    def check(self) -> None:
+        """Refuse counts and speeds out of range."""
+        super().check()
+        require_number("speed", self.speed, 0.0, 3.0, above=True, unit="m/s")
+
+    @property
+    def total(self) -> float:
+        """Simulated seconds without falls."""
+        feet = sum(map(len, FEET.values()))
+        return len(self.persons) * (len(TOLD) * feet + len(FLAT)) * self.episodes * self.seconds
+
+    def ask(self, progress: OnProgress) -> Answer:
+        """Walk every person on every foot."""
+        rows = [row for person in self.persons for row in self._feet(person, progress)]
+        flat = [row for person in self.persons for row in self._flat(person, progress)]
+        text = f"{map_table(rows)}\n\n{flat_table(flat)}\n\n{self.what_ran} of each, commanded {self.speed:g} m/s."
+        return Answer(text=text, files={"feet.csv": rows_csv(rows), "flat.csv": rows_csv(flat)})
+
+    def _feet(self, person: str, progress: OnProgress) -> list[dict[str, Any]]:
+        """Return a row for each foot, told the truth and told that it is sound."""
+        act, settings = policy_and_settings(person, {"speed": self.speed, "episode_seconds": self.seconds})
+        if settings.acts == "stiffness":
+            raise SpringfootError(f"{person} moves no person: it was trained with acts 'stiffness'")
+        groups = [(name, foot) for name, feet in FEET.items() for foot in feet]
+        rows = []
+        for told, acting in zip(TOLD, (act, told_sound(act, settings)), strict=True):
+            feet = [foot for _, foot in groups]
+            recordings = record_feet(acting, settings, feet, name=person, progress=progress, **self.how)
+            for (name, foot), recording in zip(groups, recordings, strict=True):
+                given = {} if isinstance(foot, str) else foot
+                numbers = {key: given.get(key) for key in ("ankle_stiffness", "ankle_deg", "toe_stiffness")}
+                row = {"person": person, "told": told, "foot": name, **numbers, "episodes": self.episodes}
+                rows.append(row | numbers_of(measure(recording)))
+        return rows
+
+    def _flat(self, person: str, progress: OnProgress) -> list[dict[str, Any]]:
+        """Return a row for each stiffness of both ankles."""
+        given = {"person": str(find_policy(person)), "speed": self.speed, "episode_seconds": self.seconds}
+        rows = []
+        for stiffness in FLAT:
+            name = f"constant:{stiffness:g},{FLAT_TOE:g}"
+            act, settings = policy_and_settings(name, given)
+            gait = measure(record(act, settings, name=name, progress=progress, **self.how))
+            row = {"person": person, "ankle_N_m_rad": stiffness, "episodes": self.episodes}
+            rows.append(row | numbers_of(gait))
+        return rows
+
+
+def map_table(rows: Sequence[Row]) -> str:
+    """Return the Markdown table of groups of feet, told the truth / told that the foot is sound.
+
+    `rows` are those of `FootMap`. Falls are of all episodes of a group, the other numbers means over the feet that are
+    walked on without a fall either way.
+    """
+    lines = []
+    for name in dict.fromkeys(row["foot"] for row in rows):
+        both = [[row for row in rows if (row["foot"], row["told"]) == (name, told)] for told in TOLD]
+        falls = [f"{_falls(group)} of {sum(row['episodes'] for row in group)}" for group in both]
+        unfallen = [pair for pair in zip(*both, strict=True) if not any(row["falls"] for row in pair)]
+        lines.append([name, " / ".join(falls), *(_means(unfallen, key) for key in ("speed_m_s", "fibre_J_kg_m"))])
+    return table(["right foot; told the truth / a sound foot", "falls", "m/s", "fibre work J/kg/m"], lines)
+
+
+def _falls(rows: Sequence[Row]) -> int:
+    """Return how many episodes fall."""
+    return round(sum(row["falls"] * row["episodes"] for row in rows))
+
+
+def _means(pairs: Sequence[tuple[Row, ...]], key: str) -> str:
+    """Return the means of a number over pairs of walks, in words."""
+    if not pairs or any(row[key] is None for pair in pairs for row in pair):
+        return MISSING
+    return " / ".join(text_of(float(np.mean([row[key] for row in group])), ".2f") for group in zip(*pairs, strict=True))
+
+
+def flat_table(rows: Sequence[Row]) -> str:
+    """Return the Markdown table of ankles of one stiffness; `rows` are those of `FootMap`."""
+    lines = []
+    for stiffness in dict.fromkeys(row["ankle_N_m_rad"] for row in rows):
+        here = [row for row in rows if row["ankle_N_m_rad"] == stiffness]
+        falls = f"{_falls(here)} of {sum(row['episodes'] for row in here)}"
+        walks = [(row,) for row in here if not row["falls"]]
+        lines.append([f"{stiffness:g}", falls, *(_means(walks, key) for key in ("speed_m_s", "fibre_J_kg_m"))])
+    return table(["both ankles, N·m/rad", "falls", "m/s", "fibre work J/kg/m"], lines)
