@@ -1,6 +1,7 @@
 """Collect the body of `report.html`: two strides tick by tick, as plain JSON values, and the words of its feet."""
 
 from math import radians, tan
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from springfoot.envs.physics.foot import LOCK, FootJoint
 from springfoot.envs.physics.model import SIDES
 from springfoot.envs.settings.feet import ENGAGES, KINDS, ORTHOSIS_NUMBERS, SEGMENT_RATIOS, FootSetting
 from springfoot.envs.settings.settings import BipedSettings, body_of
+from springfoot.errors import printable
 from springfoot.gait import GRAVITY
 from springfoot.gait.people.gait_events import PERCENT
 
@@ -147,14 +149,15 @@ def foot_words(setting: FootSetting) -> str:
 
 
 def walker_words(settings: BipedSettings) -> str:
-    """Return body and feet of the settings in words, such as "1.7 m, 63 kg, both feet intact"."""
+    """Return body, feet and a learned person of the settings in words, such as "1.7 m, 63 kg, both feet intact"."""
     height, mass = (
         f"{bounds[0]:g} to {bounds[1]:g}" if bounds else f"{value:g}"
         for bounds, value in ((settings.height_range, settings.height), (settings.mass_range, settings.mass))
     )
     left, right = foot_words(settings.left_foot), foot_words(settings.right_foot)
     feet = f"both feet {left}" if left == right else f"left foot {left}, right foot {right}"
-    return f"{height} m, {mass} kg, {feet}"
+    person = "" if settings.person == "tuned" else f", person {printable(Path(settings.person).stem)}"
+    return f"{height} m, {mass} kg, {feet}{person}"
 
 
 def _plain(name: str) -> str:

@@ -178,6 +178,7 @@ def test_a_foot_in_words(setting, words):
     [
         ({}, "1.7 m, 63 kg, both feet intact"),
         ({"right_foot": "no_toe", "mass": 70.0}, "1.7 m, 70 kg, left foot intact, right foot no toe"),
+        ({"person": "learned"}, "1.7 m, 63 kg, both feet intact, person learned"),
         ({"height_range": (1.5, 1.9), "left_foot": "drop"}, "1.5 to 1.9 m, 63 kg, left foot drop, right foot intact"),
     ],
 )
