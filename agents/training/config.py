@@ -167,8 +167,8 @@ PERSON_TASK = replace(
         "com_x": 0.2,
         "com_z": 0.0,
         "zmp": 0.0,
-        "pose": 1.0,
-        "grf": 1.0,
+        "pose": 2.0,
+        "grf": 2.0,
         "stiffness_rate": -0.05,
         "fibre_work": -2.0,
         "activation": -0.3,
@@ -178,8 +178,8 @@ PERSON_TASK = replace(
     },
 )
 """Task of a person: rest angles of hips, knees and ankles, and the stiffness where no other sets it, on drawn bodies,
-speeds and slopes. The reward pays for a held speed and charges what the muscles spend; people's angles and forces count
-less than for stiffness alone."""
+speeds and slopes. The reward pays for a held speed and for people's angles and forces, and charges what the muscles
+spend."""
 
 PRESETS: dict[str, TrainingConfig] = {
     "walk": TrainingConfig(),
