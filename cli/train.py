@@ -41,13 +41,16 @@ class TrainFlags:
     resume: Annotated[Path | None, FOLDER] = None
     """Folder of a run to continue, with its saved settings, bit for bit as if nothing had interrupted it; --timesteps
     is then how many more, --threads may be others, and --reward-weights others from there on."""
+    begin_from: Annotated[Path | None, FOLDER] = None
+    """Folder of a run whose network the training begins with, in place of an untrained one, as to adapt a person to one
+    foot; the task may be another, observations and actions not."""
     seeds: Annotated[int | None, tyro.conf.arg(metavar="INT", help_behavior_hint="")] = None
     """Train from so many seeds at once, --seed and the next ones: one process a processor, one thread each, one
     report with the spread; each in a folder seed-N of --out."""
     preset: Literal["walk", "any-body", "predict", "person"] = "walk"
     """Training that is known to work, from which the other flags differ: one body at one speed; people of
-    1.45-2.00 m and 40-120 kg at 0.8-1.6 m/s, drawn anew for each episode, with speeds that change within it; or one
-    body that follows its own plan, no curve of people's."""
+    1.45-2.00 m and 40-120 kg at 0.8-1.6 m/s, drawn anew for each episode, with speeds that change within it; one body
+    that follows its own plan, no curve of people's; or a person who walks on any foot."""
     engine: ENGINES = "sb3"
     """Library that learns: stable-baselines3 on this machine, or RLlib on a Ray cluster (extra `rllib`), that of the
     variable RAY_ADDRESS or this machine. --resume goes on with the engine that began."""
@@ -90,6 +93,8 @@ def run_training(flags: TrainFlags) -> int:
         if flags.engine != "rllib" and flags.out is not None:
             raise SpringfootError("--num-env-runners is of --engine rllib; give that, or drop it")
         require_count("num_env_runners", flags.num_env_runners, 0, MOST_THREADS)
+    if flags.begin_from is not None and (flags.resume or flags.seeds is not None or flags.engine != "sb3"):
+        raise SpringfootError("--begin-from begins one run with stable-baselines3; drop --resume, --seeds or --engine")
     if flags.seeds is not None:
         if flags.engine != "sb3":
             raise SpringfootError("--seeds trains with stable-baselines3; drop --engine")
@@ -133,7 +138,7 @@ def _train(flags: TrainFlags, config: TrainingConfig) -> dict[str, Any]:
     if flags.engine == "rllib":
         require_not_mirrored(config)
         return _engine(rllib=True).train(config, flags.out, flags.num_env_runners)
-    return _engine(rllib=False).train(config, flags.out)
+    return _engine(rllib=False).train(config, flags.out, begin_from=flags.begin_from)
 
 
 def _resume(flags: TrainFlags, settings: dict[str, Any]) -> dict[str, Any]:

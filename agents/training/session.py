@@ -4,6 +4,7 @@ import json
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
+from hashlib import sha256
 from pathlib import Path
 from time import monotonic
 from typing import Any
@@ -38,12 +39,16 @@ PACKAGES = ("springfoot", "mujoco", "gymnasium", "numpy", "scipy", "torch", "sta
 """Packages whose versions decide the result of a training."""
 CHECKPOINT_TIME_FRACTION = 0.02
 """Largest fraction of the wall time that checkpoints between two evaluations may take; chosen."""
+LEARNED_ARRAYS = ("network.", "observation.", "return.")
+"""First parts of the names of the arrays that a training may begin with: network and running statistics."""
 BEST_FILE = "file.best"
 """Array of a checkpoint with the bytes of the best policy's file."""
 
 
 class Session(BaseCallback):
     """Train the run in the folder `out`, from the beginning or from `checkpoint`.
+
+    At the beginning the network is untrained, or that of `begin`, a checkpoint of another run.
 
     PPO alternates rollouts, which collect steps, and updates of the weights. At the start of each rollout the exact
     state is captured; logs, evaluations and checkpoints are made of the captured state.
@@ -57,6 +62,7 @@ class Session(BaseCallback):
         checkpoint: Checkpoint | None = None,
         threads: int | None = None,
         callbacks: Sequence[UserCallback] = (),
+        begin: Checkpoint | None = None,
     ) -> None:
         super().__init__()
         self._config = config
@@ -71,6 +77,7 @@ class Session(BaseCallback):
         # A seed of 29 bits: the environments count on from it, and evaluations begin at 2^30.
         seed = int(np.random.SeedSequence([config.seed, 0]).generate_state(1)[0] >> 3)
         self.learner = Learner(config, self._environments, seed)
+        self._begun_from = {} if begin is None else {"begun_from": self._begin_with(begin)}
         self._stopping = Stopping()
         self._began = monotonic()
         self._written_at = 0.0  # time of the latest checkpoint
@@ -87,6 +94,19 @@ class Session(BaseCallback):
         self._ended: list[dict[str, Any]] = []  # infos of the episodes that ended in a rollout
         self._rollout_complete = True
 
+    def _begin_with(self, checkpoint: Checkpoint) -> dict[str, Any]:
+        """Give the learner network and running statistics of another run's checkpoint; return its entry in the record.
+
+        Raises `SpringfootError` if it has other observations, actions or layers.
+        """
+        header, arrays = checkpoint
+        same_spaces = {name: self._fingerprint[name] for name in ("observation", "action")}
+        require_same("the run to begin from", header["fingerprint"], same_spaces)
+        learned = {name: values for name, values in arrays.items() if name.startswith(LEARNED_ARRAYS)}
+        self.learner.restore(learned)
+        digest = sha256(b"".join(learned[name].tobytes() for name in sorted(learned))).hexdigest()
+        return {"timesteps": header["timesteps"], "sha256": digest}
+
     def learn(self) -> dict[str, Any]:
         """Train until the configured timesteps are done or a signal stops it; return the record."""
         with without_writer_tracebacks():
@@ -96,7 +116,7 @@ class Session(BaseCallback):
     def _learn(self) -> None:
         """Run PPO from the beginning or the checkpoint, showing progress; save at the end, also after a signal."""
         ppo = self.learner.ppo
-        session = {"from_timesteps": self._first_timesteps, **versions_and_commit(PACKAGES)}
+        session = {"from_timesteps": self._first_timesteps, **self._begun_from, **versions_and_commit(PACKAGES)}
         logged = self._restore(session)
         self._write_record("running")
         ppo.set_logger(configure(str(self._out), ["tensorboard"]))

@@ -25,19 +25,34 @@ from .run_record import is_of_rllib, read_record, runs_within
 from .session import BEST_FILE, Session
 
 
-def train(config: TrainingConfig, out: str | Path, callbacks: Sequence[UserCallback] = ()) -> dict[str, Any]:
+def train(
+    config: TrainingConfig,
+    out: str | Path,
+    callbacks: Sequence[UserCallback] = (),
+    begin_from: str | Path | None = None,
+) -> dict[str, Any]:
     """Train a new policy in the new folder `out`; return the content of `run.json`.
 
     Each of `callbacks` is a stable-baselines3 callback, or a function called after each periodic evaluation with that
     evaluation's entry of `run.json` (a dictionary). One that returns False ends the training, with status
     `interrupted`. The first SIGINT or SIGTERM also ends it in good order: status `interrupted`, policies usable. A
-    second one ends it at once. Raises `SpringfootError`, with nothing written, if `out` exists and is not an empty
-    folder, or if another process writes into it.
+    second one ends it at once. With `begin_from`, a run's folder, the network and the running statistics begin as that
+    run's newest checkpoint has them. Raises `SpringfootError`, with nothing written, if `out` exists and is not an
+    empty folder, if another process writes into it, or if that network does not fit.
     """
     out = require_new(out)
+    begin = None if begin_from is None else _trained(Path(begin_from))
     with owned(out):
         remove_temporary(require_new(out))  # checked again, now that no other process can write into it
-        return Session(config, out, {"sessions": [], "evaluations": []}, callbacks=callbacks).learn()
+        return Session(config, out, {"sessions": [], "evaluations": []}, callbacks=callbacks, begin=begin).learn()
+
+
+def _trained(run: Path) -> Checkpoint:
+    """Return the newest checkpoint of the folder `run`; raise `SpringfootError` if there is none."""
+    checkpoint = newest_checkpoint(run) if run.is_dir() else None
+    if checkpoint is None:
+        raise SpringfootError(f"{run} holds no checkpoint to begin from: give the folder of a run")
+    return checkpoint
 
 
 def resume(
@@ -74,6 +89,8 @@ def resume(
         if is_of_rllib(record):
             raise SpringfootError(f"{out} was trained by RLlib: continue it by springfoot train --resume {out}")
         checkpoint = newest_checkpoint(out)
+        if checkpoint is None and any("begun_from" in session for session in record["sessions"]):
+            raise SpringfootError(f"{out} was stopped before its first checkpoint: train it anew")
         if checkpoint is None and record.get("timesteps"):
             raise SpringfootError(f"{out} holds no run to continue: no state-{record['timesteps']}.safetensors in it")
         header = checkpoint[0] if checkpoint else {"timesteps": 0, "record": {"sessions": [], "evaluations": []}}
