@@ -10,7 +10,7 @@ from springfoot.agents.training.checkpoint import checkpoints
 from springfoot.agents.training.run_record import read_record
 from springfoot.agents.training.training import resume
 from springfoot.cli.train import train_main
-from springfoot.envs import BipedSettings
+from springfoot.envs import BipedSettings, settings_from
 from springfoot.errors import SpringfootError
 
 SHORT = TrainingConfig(
@@ -23,7 +23,7 @@ SHORT = TrainingConfig(
     eval_episodes=2,
     environment=BipedSettings(episode_seconds=1.0),
 )
-ELSEWHERE = dataclasses.replace(SHORT, environment=BipedSettings(episode_seconds=1.0, right_foot="passive", speed=1.0))
+ELSEWHERE = dataclasses.replace(SHORT, environment=settings_from(episode_seconds=1.0, right_foot="passive", speed=1.0))
 
 
 @pytest.fixture(scope="module")
