@@ -384,6 +384,16 @@ def body_of(settings: BipedSettings) -> Body:
     return Body(settings.height, settings.mass, settings.leg_ratio, settings.foot_ratio, settings.carried_ratio)
 
 
+def with_fewest_bodies(settings: BipedSettings) -> BipedSettings:
+    """Return the settings without drawn bodies that leave model and reference of the first one alone: all but the first
+    and, as it adds a part to the model, one with a load."""
+    bodies = settings.drawn_bodies
+    if bodies is None:
+        return settings
+    loaded = [body for body in bodies[1:] if body.carried_ratio]
+    return replace(settings, drawn_bodies=(bodies[0], *loaded[:1]))
+
+
 def settings_of_bodies(settings: BipedSettings) -> tuple[BipedSettings, ...]:
     """Return the settings with each of `drawn_bodies` as their body; they alone without any."""
     if settings.drawn_bodies is None:

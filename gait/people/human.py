@@ -9,7 +9,7 @@ them, and all other numbers of people that the walk uses. Every function here ta
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from importlib import resources
 from itertools import pairwise
 from math import sqrt
@@ -151,12 +151,22 @@ class HumanGait:
         if np.iscomplexobj(coefficients):  # Re sum c_k exp(2 pi i k phase), k from 0
             turn = 2j * np.pi * np.arange(len(coefficients))
             terms = turn * coefficients if derivative else coefficients
-            return np.real(np.exp(phase[..., None] * turn) @ terms)
+            waves = _waves(phase.tobytes(), len(coefficients)).reshape(*phase.shape, -1)
+            return np.real(waves @ terms)
         # sum b_k sin(k pi phase / toe_off), k from 1, in stance; 0 in swing
         wave = np.pi / self.toe_off * np.arange(1, len(coefficients) + 1)
         angle = phase[..., None] * wave
         value = np.cos(angle) @ (wave * coefficients) if derivative else np.sin(angle) @ coefficients
         return np.where(phase < self.toe_off, value, 0.0)
+
+
+@lru_cache(maxsize=64)
+def _waves(phases: bytes, count: int) -> NDArray:
+    """Return (N, `count`) exp(2 pi i k phase), k from 0, at the `phases` (N,) float64 in bytes; not to be changed.
+
+    Kept, as all curves of all bodies are evaluated at the same phases.
+    """
+    return np.exp(np.frombuffer(phases)[:, None] * (2j * np.pi * np.arange(count)))
 
 
 def fourier_series(values: NDArray) -> list[list[float]]:
