@@ -21,11 +21,14 @@ def worn_entries(body: Body, feet: Feet) -> NDArray:
 
 
 def _foot_entries(body: Body, foot: Foot) -> tuple[float, ...]:
-    """Return the `OF_FOOT` entries of one foot in their order; a device has no strength of muscles and is never
-    slack."""
+    """Return the `OF_FOOT` entries of one foot in their order; a device has no strength of muscles and is never slack.
+
+    A brace of stiffness 0 is told as none.
+    """
+    brace = foot.ankle.orthosis
     braces = [joint.orthosis.stiffness if joint.orthosis else 0.0 for joint in foot.joints]
     units = ANKLE_STIFFNESS_UNIT * body.stiffness_scale, TOE_STIFFNESS_UNIT * body.stiffness_scale
-    slack = foot.ankle.orthosis.slack if foot.ankle.orthosis else (0.0, 0.0)
+    slack = brace.slack if brace and brace.stiffness > 0.0 else (0.0, 0.0)
     rests = [joint.device.rest if joint.device else joint.rest or 0.0 for joint in foot.joints]
     own, intact = (sum(leg_segments(body, either).mass[1:]) for either in (foot, INTACT))  # [1:]: below the knee
     return (
