@@ -79,11 +79,12 @@ def main() -> None:
 
 
 def commands_in(readme: str) -> list[list[str]]:
-    """Return README's commands of the package, as words, shortened."""
+    """Return README's commands of the package, as words, shortened; `springfoot train` alone is a name in a
+    sentence."""
     blocks = re.findall(r"```sh\n(.*?)```", readme, re.DOTALL)
     lines = [line.partition("#")[0] for block in blocks for line in block.splitlines()]
     lines += re.findall(r"`([^`\n]+)`", readme)
-    commands = [shlex.split(line) for line in lines if line.startswith("springfoot ")]
+    commands = [words for line in lines if line.startswith("springfoot ") and len(words := shlex.split(line)) > 2]
     for words in commands:
         for flag, value in SHORTER.items():
             if flag in words:

@@ -25,10 +25,10 @@ def _foot_entries(body: Body, foot: Foot) -> tuple[float, ...]:
 
     A brace of stiffness 0 is told as none.
     """
-    brace = foot.ankle.orthosis
+    at_ankle = foot.ankle.orthosis
     braces = [joint.orthosis.stiffness if joint.orthosis else 0.0 for joint in foot.joints]
     units = ANKLE_STIFFNESS_UNIT * body.stiffness_scale, TOE_STIFFNESS_UNIT * body.stiffness_scale
-    slack = brace.slack if brace and brace.stiffness > 0.0 else (0.0, 0.0)
+    slack = at_ankle.slack if at_ankle and at_ankle.stiffness > 0.0 else (0.0, 0.0)
     rests = [joint.device.rest if joint.device else joint.rest or 0.0 for joint in foot.joints]
     own, intact = (sum(leg_segments(body, either).mass[1:]) for either in (foot, INTACT))  # [1:]: below the knee
     return (

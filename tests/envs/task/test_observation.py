@@ -4,8 +4,11 @@ import numpy as np
 import pytest
 from planned_body import Setup
 
+from springfoot.envs.physics.foot import SOUND
 from springfoot.envs.physics.model import ACTIONS, LEFT, RIGHT
+from springfoot.envs.settings.settings import body_of, settings_from
 from springfoot.envs.task.observation_entries import OBSERVATION
+from springfoot.envs.task.worn import worn_entries
 from springfoot.gait.body.body import GRAVITY
 
 
@@ -96,3 +99,11 @@ def test_contact_loads_are_in_weights_of_the_body_with_what_it_carries(thesis_bo
     )
     assert alone == pytest.approx(100.0 / (63.0 * GRAVITY), rel=1e-6)
     assert carrying == pytest.approx(alone / 1.25, rel=1e-6)
+
+
+@pytest.mark.parametrize("engages", [{}, {"engages": "dorsiflexion"}])
+def test_a_brace_of_no_stiffness_is_told_as_none(engages):
+    brace = {"ankle_stiffness": 0.0, "ankle_deg": -5.0} | engages
+    settings = settings_from(right_foot={"kind": "intact", "orthosis": brace})
+    body = body_of(settings)
+    assert (worn_entries(body, settings.feet) == worn_entries(body, SOUND)).all()
