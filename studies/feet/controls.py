@@ -72,7 +72,7 @@ class Springs:
         return {k: f"{f'{k:g} N·m/rad' if k else 'slack'}, {self.name}" for k in self.settings}
 
 
-SPRINGS = (
+TRIED_SPRINGS = (
     Springs(
         name="both ankles",
         against=UNCHANGED,
@@ -94,7 +94,7 @@ SPRINGS = (
 """Springs whose best stiffness and saving are told."""
 CONTROLS: dict[str, Mapping[str, Any]] = {
     UNCHANGED: {},
-    **{springs.conditions[k]: given for springs in SPRINGS for k, given in springs.settings.items()},
+    **{springs.conditions[k]: given for springs in TRIED_SPRINGS for k, given in springs.settings.items()},
     STIFFEST: {"right_foot": _brace(ankle_stiffness=500.0)},
     "feet of twice the mass": _both({"kind": "intact", "foot_mass_ratio": 2.0, "foot_inertia_ratio": 2.0}),
     "20 % of body weight on the back": {"carried_ratio": 0.2},
@@ -197,7 +197,7 @@ def _cell(pairs: Sequence[tuple[Row, Row]]) -> str:
 
 
 def best_springs(even: Sequence[Row]) -> list[dict[str, Any]]:
-    """Return the best stiffness [N m/rad] of each of `SPRINGS` and its saving, for each policy, price and walked speed.
+    """Return the best stiffness [N m/rad] of `TRIED_SPRINGS` and its saving, for each policy, price and walked speed.
 
     The best is the lowest point of the parabola through the cheapest stiffness and its neighbours; the first or the
     last one that was walked if that is the cheapest. The saving is a share of the price that it is compared with, > 0
@@ -206,7 +206,7 @@ def best_springs(even: Sequence[Row]) -> list[dict[str, Any]]:
     prices = _prices(even)
     policies, _, speeds = (list(dict.fromkeys(names)) for names in zip(*prices, strict=True))
     rows = []
-    for who, springs, at, price in product(policies, SPRINGS, speeds, TWO_PRICES):
+    for who, springs, at, price in product(policies, TRIED_SPRINGS, speeds, TWO_PRICES):
         without = prices[who, springs.against, at][price]
         walked = {k: prices[who, name, at][price] for k, name in springs.conditions.items()}
         best, least = _lowest({k: value for k, value in walked.items() if value is not None})
@@ -241,7 +241,7 @@ def best_table(best: Sequence[Row]) -> str:
     """
     speeds = list(dict.fromkeys(row["speed_m_s"] for row in best))
     lines = []
-    for springs in SPRINGS:
+    for springs in TRIED_SPRINGS:
         line = [springs.name, springs.against]
         for speed in speeds:
             rows = [

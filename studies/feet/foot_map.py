@@ -30,13 +30,13 @@ from ..base.study import Answer, OnProgress, WalkingStudy
 from .foot_numbers import numbers_of
 from .walked_speeds import Row, rows_csv
 
-Foot = str | dict[str, Any]
+RightFoot = str | dict[str, Any]
 PASSIVE = [
     {"kind": "passive", "ankle_stiffness": k, "ankle_deg": rest, "toe_stiffness": toe}
     for k, rest, toe in product((150.0, 250.0, 400.0, 600.0, 1000.0, 1500.0), (0.0, 4.0, 8.0), (20.0, 60.0))
 ]
 """Passive feet: six ankles, three rest angles, two toes."""
-FEET: dict[str, list[Foot]] = {
+MAPPED_FEET: dict[str, list[RightFoot]] = {
     "sound": ["intact"],
     "calf of 25 %": [{"kind": "weak", "strength": 0.25}],
     "sound, braced by 200 N·m/rad": [{"kind": "intact", "orthosis": {"ankle_stiffness": 200.0}}],
@@ -93,7 +93,7 @@ class FootMap(WalkingStudy):
     @property
     def total(self) -> float:
         """Simulated seconds without falls."""
-        feet = sum(map(len, FEET.values()))
+        feet = sum(map(len, MAPPED_FEET.values()))
         return len(self.persons) * (len(TOLD) * feet + len(FLAT)) * self.episodes * self.seconds
 
     def ask(self, progress: OnProgress) -> Answer:
@@ -108,7 +108,7 @@ class FootMap(WalkingStudy):
         act, settings = policy_and_settings(person, {"speed": self.speed, "episode_seconds": self.seconds})
         if settings.acts == "stiffness":
             raise SpringfootError(f"{person} moves no person: it was trained with acts 'stiffness'")
-        groups = [(name, foot) for name, feet in FEET.items() for foot in feet]
+        groups = [(name, foot) for name, feet in MAPPED_FEET.items() for foot in feet]
         rows = []
         for told, acting in zip(TOLD, (act, told_sound(act, settings)), strict=True):
             feet = [foot for _, foot in groups]

@@ -50,6 +50,6 @@ def test_what_is_done_is_kept_until_its_example_changes(tmp_path, monkeypatch):
 def test_every_example_is_a_learner_short_and_in_the_page():
     examples = {path.stem: path.read_text(encoding="utf-8") for path in learners.EXAMPLES.glob("*.py")}
     assert set(examples) == {learner.example for learner in learners.LEARNERS}
-    assert max(len(text.splitlines()) for text in examples.values()) <= 60
+    assert max(len(text.splitlines()) for text in examples.values()) <= 64  # four for imports that may be missing
     page = (learners.ROOT / "docs" / "how-to" / "learners.md").read_text(encoding="utf-8")
     assert all(f"(../../examples/learners/{name}.py)" in page for name in examples)
