@@ -3,7 +3,7 @@
 The owner holds a lock on the file `.owner` in the folder, which holds its process id, host and start. The system
 releases the lock when the process ends, however it ends; so a free lock on an existing file belonged to a dead owner.
 Locks do not reach from host to host everywhere: the owner touches its file every minute, and an owner on another host
-counts as dead after ten minutes without a touch.
+counts as dead after ten minutes without a touch. Without locks the same holds for one on this host that still runs.
 """
 
 import json
@@ -65,7 +65,7 @@ def owned(folder: Path) -> Iterator[None]:
         ended = threading.Event()
         try:
             try:
-                former_owner = _dead_owner(folder, handle, locked)
+                former_owner = _require_dead_owner(folder, handle, locked)
             except SpringfootError:
                 removes_file = False
                 raise
@@ -91,7 +91,7 @@ def owned(folder: Path) -> Iterator[None]:
                 new_folder.rmdir()
 
 
-def _dead_owner(folder: Path, handle: int, locked: bool) -> dict[str, Any]:
+def _require_dead_owner(folder: Path, handle: int, locked: bool) -> dict[str, Any]:
     """Return the record of a folder's former owner, empty if there was none.
 
     `handle` is that of the owner's file, and `locked` tells whether this process holds its lock. Raises `TakenError` if
@@ -101,8 +101,10 @@ def _dead_owner(folder: Path, handle: int, locked: bool) -> dict[str, Any]:
     owner = _owner_in(handle)
     if os.fstat(handle).st_size and not owner.keys() >= _KEYS:
         raise SpringfootError(f"{path} is not a file of springfoot's: remove it")
-    # With the lock, an owner of this host is dead. Otherwise its process tells, and on another host its last touch.
-    if owner and (owner.get("host") != socket.gethostname() or (not locked and _is_running(owner))):
+    # With the lock, an owner of this host is dead; without it, if its process has ended. All others: by the last touch.
+    is_here = owner.get("host") == socket.gethostname()
+    may_live = not is_here or (not locked and _is_running(owner))
+    if owner and may_live:
         silence = time.time() - path.stat().st_mtime
         if silence < -DEAD:  # touched in the future: the clocks of the two hosts differ
             ahead = _time_in_words(-silence)

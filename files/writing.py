@@ -177,7 +177,8 @@ def _empty(folder: Path) -> None:
 def csv_text(head: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
     """Return the text of a CSV file with a line of names and rows of values.
 
-    Floats have six significant digits; None and floats that are not finite are empty cells.
+    Floats have six significant digits and no zeros at their end, as Python's format "g" writes them: 0.5, 12, 1e-07.
+    None and floats that are not finite are empty cells.
     """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")

@@ -330,20 +330,19 @@ class Biped(ExactState):
         if action.shape != (self.num_envs, len(self.action_names)):
             expected = self.num_envs, len(self.action_names)
             raise SpringfootError(f"actions must have shape {expected}, got {action.shape}")
-        of_stiffness = action
-        of_person = None
-        if self._acts_as_person:
-            of_stiffness = np.zeros((self.num_envs, len(ACTIONS)))  # unless the action sets it too
-            of_person = action[:, -len(PERSON_ACTIONS) :]
-            if self._acts_on_stiffness:
-                of_stiffness = np.ascontiguousarray(action[:, : len(ACTIONS)])
+        # The stiffness comes first, the person after it; either may be missing.
+        of_stiffness = np.zeros((self.num_envs, len(ACTIONS)))
+        if self._acts_on_stiffness:
+            of_stiffness = np.ascontiguousarray(action[:, : len(ACTIONS)])
+        of_person = action[:, -len(PERSON_ACTIONS) :] if self._acts_as_person else None
         finite = of_person is None or np.isfinite(of_person[running]).all()
         taken = self._decisions.take(of_stiffness, running) if finite else None
         if taken is None:
             raise SpringfootError("actions must be finite numbers in [-1, 1], got NaN or infinity")
         factor = self._springs.factor(taken)
+        # Where the setting `stiffness_by` has others set the stiffness, their factor takes the place of the action's.
         self._person.replace(factor, self._springs.factor_at_one, running, self._random)
-        # Without `Standing` all bodies that run walk, and none with the fixed stiffness.
+        # Until `_before_step` asks `Standing`, all bodies that run walk, and none with the fixed stiffness.
         return _Step(running=running, ids=ids, factor=factor, of_person=of_person, walking=running, fixed=self._nobody)
 
     def _before_step(self, step: "_Step") -> None:

@@ -353,7 +353,7 @@ class FootSprings:
         one."""
         tendon = np.inf if self._settings.ankle_tendon is None else TENDON_SHARE * self._settings.ankle_tendon
         for index in ids:
-            body = self._subjects.home(index)
+            body = self._subjects.table_body(index)
             middle, _ = _log_scale(self._settings, body)
             scale = body.strength_scale  # a load makes neither tendon nor tissue stiffer
             self.options[["middle", "tendon", "tissue"]][index] = middle, tendon * scale, scale

@@ -87,32 +87,38 @@ class Subjects:
         self, settings: BipedSettings, speeds: NDArray, num: int, variant: NDArray | None = None, variants: int = 1
     ):
         self._settings = settings
-        self._homes = [body_of(of_body) for of_body in settings_of_bodies(settings)]
-        self._home = self._homes[0]  # all have the settings' height and mass
+        # The bodies that the tables were made for, one for each of the drawn proportions; all have one height and mass.
+        self._table_bodies = [body_of(one) for one in settings_of_bodies(settings)]
+        self._usual = self._table_bodies[0]
         self._speeds = speeds
         self._variant = np.zeros(num, int) if variant is None else np.asarray(variant, int)
         self._variants = variants
         self.proportions = np.zeros(num, int)
         """(N,) index of each environment's body in `drawn_bodies`; 0 without them."""
-        self.bodies = [self._home] * num
+        self.bodies = [self._usual] * num
         """Body of each environment."""
         self.rows = np.zeros(num, CONTROL_ROW)
         """(N,) row of the control for each environment."""
+        # The arrays below are views into `rows`, which the kernels read.
         subjects = self.rows["subject"]
-        self.place, self.scale = subjects["place"], subjects["scale"]
-        """(N,) place of the commanded speed in tables of variants x speeds, and ratios of the bodies to that of the
-        settings."""
-        self.speed, self.target, self._change = subjects["speed"], subjects["target"], subjects["change"]
-        """(N,) present commanded speed and its target [m/s]; time of the next drawn target [s]."""
+        self.place = subjects["place"]
+        """(N,) place of the commanded speed in tables of variants x speeds."""
+        self.scale = subjects["scale"]
+        """(N,) ratios of the bodies to that of the settings."""
+        self.speed = subjects["speed"]
+        """(N,) present commanded speed [m/s]."""
+        self.target = subjects["target"]
+        """(N,) speed to which the commanded speed goes [m/s]."""
+        self._next_draw = subjects["change"]  # (N,) time at which the next target is drawn [s]
         self.slope = subjects["slope"]
         """(N,) slope of the ground [rad], uphill positive; set by `envs.task.ground`."""
-        subjects["height"] = self._home.height
-        subjects["mass"] = self._home.mass
+        subjects["height"] = self._usual.height
+        subjects["mass"] = self._usual.mass
         self.scale[:] = 1.0
         self.speed[:] = self.target[:] = settings.speed
         self.slope[:] = radians(settings.slope_deg)
-        self._change[:] = np.inf
-        self._changing = False
+        self._next_draw[:] = np.inf
+        self._speeds_move = False
         self._everyone = np.arange(num)
         self._locate(self._everyone)
 
@@ -137,18 +143,20 @@ class Subjects:
         changed = self._embody(ids, [body for body, _, _ in drawn], [proportions for _, proportions, _ in drawn])
         for index, random, (_, _, speed) in zip(ids.tolist(), randoms, drawn, strict=True):
             self.speed[index] = self.target[index] = speed
-            self._change[index] = self._next_change(0.0, random)
+            self._next_draw[index] = self._next_change(0.0, random)
         self._locate(ids)
         return changed
 
     def embody(self, ids: NDArray, height: NDArray, mass: NDArray, proportions: NDArray) -> list[int]:
         """Give environments `ids` (K,) bodies of `height` (K,) [m], `mass` (K,) [kg] and `proportions` (K,); return the
         indices of those with a changed body, as `reset` does."""
-        if not set(proportions.tolist()) <= set(range(len(self._homes))):
-            raise SpringfootError(f"the state does not fit: 'proportions' must be from 0 to {len(self._homes) - 1}")
+        if not set(proportions.tolist()) <= set(range(len(self._table_bodies))):
+            raise SpringfootError(
+                f"the state does not fit: 'proportions' must be from 0 to {len(self._table_bodies) - 1}"
+            )
         sizes = zip(height.tolist(), mass.tolist(), proportions.tolist(), strict=True)
-        bodies = [replace(self._homes[p], height=h, mass=m) for h, m, p in sizes]
-        self._changing = True  # the next step finds out whether a speed has to change
+        bodies = [replace(self._table_bodies[p], height=h, mass=m) for h, m, p in sizes]
+        self._speeds_move = True  # the next step finds out whether a speed has to change
         return self._embody(ids, bodies, proportions.tolist())
 
     def _embody(self, ids: NDArray, bodies: Sequence[Body], proportions: Sequence[int]) -> list[int]:
@@ -160,8 +168,8 @@ class Subjects:
             if body != self.bodies[index]:
                 changed.append(index)
                 self.bodies[index] = body
-                length = body.height / self._home.height
-                mass = body.mass / self._home.mass
+                length = body.height / self._usual.height
+                mass = body.mass / self._usual.mass
                 self.scale[index] = length, sqrt(length), mass, mass * length  # the fields of `SCALE`
                 self.rows["subject"][["height", "mass"]][index] = body.height, body.mass
         return changed
@@ -171,18 +179,18 @@ class Subjects:
         for index, value in zip(ids.tolist(), speed.tolist(), strict=True):
             self._check(self.bodies[index], value)
         self.target[ids] = speed
-        self._changing = True
+        self._speeds_move = True
 
     def begin(self, ids: NDArray, speed: NDArray) -> None:
         """Set the commanded speed of environments `ids` (K,) to `speed` (K,) [m/s]; it then goes to its target."""
         self.speed[ids] = speed
-        self._changing = True
+        self._speeds_move = True
 
     def end(self, ids: NDArray, speed: NDArray) -> None:
         """Let the commanded speed of environments `ids` (K,) go to `speed` (K,) [m/s], and then stay there."""
         self.target[ids] = speed
-        self._change[ids] = np.inf
-        self._changing = True
+        self._next_draw[ids] = np.inf
+        self._speeds_move = True
 
     def advance(self, steps: NDArray, randoms: Sequence[np.random.Generator | None], running: NDArray) -> bool:
         """Let a step pass for the `running` (N,) environments, which have done `steps` (N,) before; draw new target
@@ -190,21 +198,21 @@ class Subjects:
         settings = self._settings
         if settings.speed_interval is not None:
             time = steps * settings.step_seconds
-            for index in np.flatnonzero(running & (time >= self._change)).tolist():
+            for index in np.flatnonzero(running & (time >= self._next_draw)).tolist():
                 random = randoms[index]
                 if random is not None and settings.speed_range is not None:
                     self.target[index] = random.uniform(*settings.speed_range)
-                    self._change[index] = self._next_change(time[index], random)
-                    self._changing = True
-        if not self._changing:
+                    self._next_draw[index] = self._next_change(time[index], random)
+                    self._speeds_move = True
+        if not self._speeds_move:
             return False
-        self._changing = _approach(settings.speed_rate * settings.step_seconds, running, self.rows["subject"])
+        self._speeds_move = _approach(settings.speed_rate * settings.step_seconds, running, self.rows["subject"])
         self._locate(self._everyone)
         return True
 
-    def home(self, index: int) -> Body:
+    def table_body(self, index: int) -> Body:
         """Return the body of the tables for environment `index`: that of the settings, with its proportions."""
-        return self._homes[self.proportions[index]]
+        return self._table_bodies[self.proportions[index]]
 
     def check(self, given: Mapping[str, Any] | None) -> None:
         """Raise `SpringfootError` for a `body` in `given`, as of `reset`, that is no index in `drawn_bodies`."""
@@ -234,7 +242,7 @@ class Subjects:
             drawn = {name: random.uniform(*ranges[name]) for name in ("height", "mass") if ranges[name]}
             chosen = values | drawn | given
             try:
-                body = replace(self._homes[proportions], height=chosen["height"], mass=chosen["mass"])
+                body = replace(self._table_bodies[proportions], height=chosen["height"], mass=chosen["mass"])
                 break
             except SpringfootError:
                 if draws_left == 1 or not drawn.keys() - given.keys():  # another draw would give the same body
@@ -250,7 +258,7 @@ class Subjects:
 
     def _check(self, body: Body, speed: float) -> None:
         """Raise `SpringfootError` for a speed that the tables do not cover for this body."""
-        time_scale = sqrt(body.height / self._home.height)
+        time_scale = sqrt(body.height / self._usual.height)
         low = self._speeds[0] * time_scale
         high = self._speeds[-1] * time_scale
         if not low - 1e-9 <= speed <= high + 1e-9:  # an end itself may err by rounding

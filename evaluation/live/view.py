@@ -109,7 +109,8 @@ class LiveView:
             if step % steps_a_curve == 0:
                 self._send_numbers()
             delay = time.perf_counter() - due
-            due += delay if delay > LATE else 0.0
+            if delay > LATE:
+                due = due + delay
             time.sleep(max(0.0, -delay))  # until the step is due, if it is early
         return (self.frames - frames_before) / (time.perf_counter() - begin)
 

@@ -182,7 +182,7 @@ def _add_steps(
     in_time = steps[:, 1] <= steady[1]
     steps = steps[in_time]
     sides = sides[in_time]
-    for side in range(len(SIDES)):  # the standing foot: its stance begins with the step
+    for side in range(len(SIDES)):  # that of the foot that lands as the step begins; the other foot ends the step
         begin, end = steps[sides == side].T
         relative = np.column_stack(
             [series["com"][:, 0] - series["ankle"][:, side, 0], series["com"][:, 1], series["com_velocity"][:, 0]]
@@ -198,10 +198,10 @@ def _add_steps(
         tally.step_time += list(end - begin)
         tally.step_sides += [1 - side] * len(begin)
         # The trailing foot leaves the ground within this step; without such a toe-off the body was in flight.
-        support = next_after(contacts[1 - side].toe_offs, begin) - begin
-        support = np.where(support < end - begin, support, 0.0)
-        tally.double_support += list(support)
-        work = _sums(com_work, begin, begin + support)  # (step, side, (positive, negative))
+        both_on_ground = next_after(contacts[1 - side].toe_offs, begin) - begin  # [s]
+        both_on_ground = np.where(both_on_ground < end - begin, both_on_ground, 0.0)
+        tally.double_support += list(both_on_ground)
+        work = _sums(com_work, begin, begin + both_on_ground)  # (step, side, (positive, negative))
         tally.push_off += list(work[:, 1 - side, 0])
         tally.collision += list(-work[:, side, 1])
 

@@ -37,6 +37,7 @@ def write_schedules(folder: Path, recording: Recording) -> None:
     curves = schedule_curves(recording)
     settings = recording.settings
     body = body_of(recording.settings)
+    # Columns that say where the curves come from, the same in every row.
     origin = {
         "policy": recording.policy,
         "height_m": body.height,
@@ -44,8 +45,11 @@ def write_schedules(folder: Path, recording: Recording) -> None:
         "speed_m_s": settings.speed,
         "equilibrium": settings.equilibrium,
     }
-    values = ([*origin.values(), *(curve[percent] for curve in curves.values())] for percent in PERCENT)
-    rows = ([int(percent), *row, BLANK_DIGEST] for percent, row in zip(PERCENT, values, strict=True))
+    rows = []
+    for percent in map(int, PERCENT):
+        of_percent = [curve[percent] for curve in curves.values()]
+        rows.append([percent, *origin.values(), *of_percent, BLANK_DIGEST])
+    # The digest of the whole text stands in each row, in place of the blank one, so that a changed file is noticed.
     text = with_digest(csv_text(["percent", *origin, *curves, DIGEST], rows))
     (folder / "stiffness_schedule.csv").write_text(text, encoding="utf-8", newline="")
     groups = alike_legs(settings) if deciding_legs(settings) else []

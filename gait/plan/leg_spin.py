@@ -36,9 +36,18 @@ def spinning_legs(
 ) -> tuple[ComMotion, LegPostures]:
     """Find the CoM motion, and the legs, that agree with the legs' angular momentum.
 
-    The mean CoM is at `height` [m], or without a `height` where the straightest knee is flexed by `knee` [rad].
-    `legs_at` plans for a CoM height [m] and a pivot ahead of the CoM [m] over time [s]; `still` is the pivot of legs
-    that do not turn. The trunk leans by `lean` [rad]. Raises `SpringfootError` if the rounds do not settle.
+    Only plans with a style of walking count this momentum; those after people's curves leave it out.
+
+    Args:
+        body: the body that walks.
+        legs_at: plans CoM motion and legs for a mean CoM height [m] and a pivot ahead of the CoM [m] over time [s].
+        still: the pivot [m] over time [s] of legs that do not turn, with which the rounds begin.
+        step_length: length of a step [m].
+        knee: least flexion of the knee [rad]; it sets the mean CoM height if `height` does not.
+        height: mean CoM height [m], if it is given.
+        lean: forward lean of the trunk [rad].
+
+    Raises `SpringfootError` if the rounds do not settle.
     """
     reach = full_reach(body, knee)
     fixed_height = height

@@ -45,9 +45,9 @@ def fit_spring(torque: NDArray, angle: NDArray, velocity: NDArray) -> SpringFit:
     scale = np.sqrt((deviation**2).mean(-2))
     solvable = bool(np.all(scale > 1e-9 * (1 + np.abs(mean))))  # angle and velocity vary by more than rounding
     scale = np.where(scale > 0, scale, 1.0)  # no division by 0
-    scaled = deviation / scale[..., None, :]
+    unit_columns = deviation / scale[..., None, :]  # angle and velocity, each of mean square 1
     # The normal equations X'X (K, c) = -X' torque, with the columns angle and velocity.
-    gram = np.einsum("...ni,...nj->...ij", scaled, scaled)
+    gram = np.einsum("...ni,...nj->...ij", unit_columns, unit_columns)
     solvable &= bool(np.all(np.linalg.det(gram) > 1e-10 * count**2))  # not the same curve twice, but for its size
     inverse = np.linalg.pinv(gram, hermitian=True) / scale[..., None, :] / scale[..., :, None]
     moment = np.einsum("...ni,...n->...i", deviation, torque - torque.mean(-1, keepdims=True))

@@ -34,12 +34,19 @@ def flag_of(kind: Any) -> tyro.constructors.PrimitiveConstructorSpec:
     """
     if kind is bool:
         return reader_of_words(lambda words: not words or _read(Literal[True, False], words), "[True|False]", (0, 1))
+    return reader_of_words(lambda words: _read(kind, words), metavar_of(kind), _count_of_words(kind))
+
+
+def _count_of_words(kind: Any) -> Any:
+    """Return the number of words of a value of type `kind`, as `reader_of_words` takes it."""
     tuple_kind = next((part for part in _parts(kind) if get_origin(part) is tuple), None)  # `kind`, or a part of it
     items = get_args(tuple_kind) if tuple_kind is not None else ()
-    count: Any = "*" if _is_open(items) else len(items) or 1
-    if tuple_kind not in (None, kind) and count != 1:
-        count = (1, count)  # one word for None
-    return reader_of_words(lambda words: _read(kind, words), metavar_of(kind), count)
+    if _is_open(items):
+        return "*"
+    if len(items) < 2:
+        return 1
+    may_be_none = tuple_kind != kind
+    return (1, len(items)) if may_be_none else len(items)  # None is one word
 
 
 def reader_of_words(

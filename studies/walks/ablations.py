@@ -263,8 +263,10 @@ class Ablations(TrainingStudy):
     @property
     def total(self) -> float:
         """Return the simulated time of all walks if none falls [s]."""
-        springs = 1 + (self.constant is not None)  # thesis lines, constant
-        rows = len(self.only or ABLATIONS) * self.seeds + len(INPUTS) + 1 + springs  # 1: the ankle's angle
+        trained = len(self.only or ABLATIONS) * self.seeds
+        inputs = len(INPUTS) + 1  # 1: the ankle's angle
+        fixed_springs = 1 + (self.constant is not None)  # the thesis's lines, the constant
+        rows = trained + inputs + fixed_springs
         conditions = 2  # undisturbed, pushed
         return conditions * rows * self.episodes * self.seconds
 
@@ -273,11 +275,11 @@ class Ablations(TrainingStudy):
         walks = PushedWalks(seconds=self.seconds, push_newton=self.push_newton, progress=progress, **self.how)
         failed = self.train_missing(jobs(self.runs, self.only or tuple(ABLATIONS), self.seeds, self.timesteps))
         trained = measure_trained(self.runs, walks)
-        springs = measure_springs(self.runs, walks, self.constant)
+        of_springs = measure_springs(self.runs, walks, self.constant)
         learned = {"walk": "learned, planned θ_eq", "neutral": "learned, constant θ_eq"}
-        springs |= {f"{label} (`{name}`)": trained[name] for name, label in learned.items() if name in trained}
+        of_springs |= {f"{label} (`{name}`)": trained[name] for name, label in learned.items() if name in trained}
         explained = {f"`{name}`: {MEANING[name]}": seeds for name, seeds in trained.items()}
-        tables = {"SPRINGS": springs, "ABLATIONS": explained, "INPUTS": measure_inputs(self.runs, walks)}
+        tables = {"SPRINGS": of_springs, "ABLATIONS": explained, "INPUTS": measure_inputs(self.runs, walks)}
         heads = {"SPRINGS": "spring", "ABLATIONS": "training", "INPUTS": "fixed schedule"}
         note = f"{walks.sentence} Mean ± SD over training seeds."
         texts = {name: rows_table(rows, heads[name], people=name == "SPRINGS") for name, rows in tables.items()}
