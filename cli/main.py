@@ -68,7 +68,9 @@ STUDIES = {
         "feet.foot_map.FootMap",
         "Which feet does a learned person walk on, and what is it worth to know them?",
     ),
-    "orthosis": ("feet.orthosis.Orthosis", "Which spring beside the ankle helps a weak calf, and which a drop foot?"),
+    "orthosis": ("feet.orthosis.Orthosis", "Which spring beside the ankles helps weak calves?"),
+    "prosthesis": ("feet.prosthesis.Prosthesis", "Which stiffness of a passive prosthetic ankle takes least?"),
+    "drop-foot": ("feet.drop_foot.DropFoot", "Which spring beside the ankle holds a drop foot?"),
     "play": ("walks.play.Play", "What does a stiffness do to a walk? A recorded page to play with."),
 }
 """Name of each study on the command line -> its class, imported when asked for, and its question."""

@@ -242,7 +242,7 @@ def record_each(
 def record_feet(
     policy: PolicyFunction,
     settings: BipedSettings,
-    right_feet: Sequence[str | dict[str, Any]],
+    feet: Sequence[Mapping[str, Any]],
     *,
     name: str,
     episodes: int = 20,
@@ -250,20 +250,21 @@ def record_feet(
     threads: int = 2,
     progress: Callable[[float], object] = lambda seconds: None,
 ) -> list[Recording]:
-    """Record, as `record` does, the same episodes on each of the `right_feet` (settings of feet), side by side.
+    """Record, as `record` does, the same episodes on all `feet`, side by side.
 
-    Returns a recording for each foot. Episode i on each of them is from seed `seed` + i.
+    `feet` are settings of one foot or both, such as `{"right_foot": "passive"}`. Returns a recording for each. Episode
+    i on each of them is from seed `seed` + i.
     """
-    settings_by_foot = [replace(settings, right_foot=foot) for foot in right_feet]
-    # One walk after another: all episodes on the first foot, then all on the next.
-    feet = [foot_settings.feet for foot_settings in settings_by_foot for _ in range(episodes)]
-    seeds = [seed + episode for _ in settings_by_foot for episode in range(episodes)]
+    settings_by_feet = [replace(settings, **one) for one in feet]
+    # One walk after another: all episodes on the first feet, then all on the next.
+    feet_of_episodes = [on_feet.feet for on_feet in settings_by_feet for _ in range(episodes)]
+    seeds = [seed + episode for _ in settings_by_feet for episode in range(episodes)]
     course: dict[str, Any] = planned_course(reference_walk_at(settings, settings.speed).plan)
-    kept = record_all(policy, settings, seeds, threads=threads, feet=feet, progress=progress)
+    kept = record_all(policy, settings, seeds, threads=threads, feet=feet_of_episodes, progress=progress)
     recordings = []
-    for index, foot_settings in enumerate(settings_by_foot):
+    for index, on_feet in enumerate(settings_by_feet):
         rows = slice(index * episodes, (index + 1) * episodes)
-        recordings.append(Recording(policy=name, settings=foot_settings, seed=seed, **kept.of(rows), **course))
+        recordings.append(Recording(policy=name, settings=on_feet, seed=seed, **kept.of(rows), **course))
     return recordings
 
 

@@ -23,7 +23,7 @@ from springfoot.evaluation.recording import policy_and_settings, record
 from springfoot.files.markdown import MISSING, table, text_of
 
 from ..base.study import Answer, OnProgress, WalkingStudy
-from .walked_speeds import TWO_PRICES, Row, at_walked_speeds, rows_csv
+from .walked_speeds import TWO_PRICES, Row, at_walked_speeds, lowest, rows_csv
 
 ASKED_SPEEDS = (0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6)
 """Commanded speeds [m/s]."""
@@ -100,6 +100,10 @@ CONTROLS: dict[str, Mapping[str, Any]] = {
     "20 % of body weight on the back": {"carried_ratio": 0.2},
     "slope +2°": {"slope_deg": 2.0},
     "slope −2°": {"slope_deg": -2.0},
+    "both calves of 25 %": _both({"kind": "weak", "strength": 0.25}),
+    "right toe locked": {"right_foot": "rigid_toe"},
+    "rigid right foot": {"right_foot": "rigid"},
+    "passive right foot, 400 N·m/rad": {"right_foot": {"kind": "passive", "ankle_stiffness": 400.0}},
 }
 """Name of a condition -> settings that differ from the sound walk."""
 
@@ -199,8 +203,7 @@ def _cell(pairs: Sequence[tuple[Row, Row]]) -> str:
 def best_springs(even: Sequence[Row]) -> list[dict[str, Any]]:
     """Return the best stiffness [N m/rad] of `TRIED_SPRINGS` and its saving, for each policy, price and walked speed.
 
-    The best is the lowest point of the parabola through the cheapest stiffness and its neighbours; the first or the
-    last one that was walked if that is the cheapest. The saving is a share of the price that it is compared with, > 0
+    The best is that of `lowest`. The saving is a share of the price that it is compared with, > 0
     if the spring is cheaper. None where nobody walks.
     """
     prices = _prices(even)
@@ -209,29 +212,12 @@ def best_springs(even: Sequence[Row]) -> list[dict[str, Any]]:
     for who, springs, at, price in product(policies, TRIED_SPRINGS, speeds, TWO_PRICES):
         without = prices[who, springs.against, at][price]
         walked = {k: prices[who, name, at][price] for k, name in springs.conditions.items()}
-        best, least = _lowest({k: value for k, value in walked.items() if value is not None})
+        known = {k: value for k, value in walked.items() if value is not None}
+        best, least = lowest(known) if known else (None, None)
         saving = None if least is None or without is None else 1.0 - least / without
         named = {"policy": who, "springs": springs.name, "speed_m_s": at, "price": price}
         rows.append({**named, "best_N_m_rad": best, "saving": saving})
     return rows
-
-
-def _lowest(walked: Mapping[float, float]) -> tuple[float | None, float | None]:
-    """Return the stiffness with the least price, and that price, as `best_springs` says; None for no stiffness.
-
-    `walked` are prices by rising stiffness.
-    """
-    if not walked:
-        return None, None
-    stiffness = list(walked)
-    cheapest = min(walked, key=lambda k: walked[k])
-    index = stiffness.index(cheapest)
-    around = stiffness[max(index - 1, 0) : index + 2]
-    if len(around) < 3:
-        return cheapest, walked[cheapest]
-    parabola = np.poly1d(np.polyfit(around, [walked[k] for k in around], 2))
-    best = float(-parabola.c[1] / (2.0 * parabola.c[0]))
-    return best, float(parabola(best))
 
 
 def best_table(best: Sequence[Row]) -> str:

@@ -111,7 +111,7 @@ class FootMap(WalkingStudy):
         groups = [(name, foot) for name, feet in MAPPED_FEET.items() for foot in feet]
         rows = []
         for told, acting in zip(TOLD, (act, told_sound(act, settings)), strict=True):
-            feet = [foot for _, foot in groups]
+            feet = [{"right_foot": foot} for _, foot in groups]
             recordings = record_feet(acting, settings, feet, name=person, progress=progress, **self.how)
             for (name, foot), recording in zip(groups, recordings, strict=True):
                 given = {} if isinstance(foot, str) else foot

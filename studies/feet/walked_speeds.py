@@ -49,6 +49,23 @@ def _prices_at(speed: float, slow: Row, fast: Row) -> dict[str, float] | None:
     return {price: float(np.interp(speed, [low, high], [slow[price], fast[price]])) for price in TWO_PRICES}
 
 
+def lowest(walked: Mapping[float, float]) -> tuple[float, float]:
+    """Return the stiffness with the least price, and that price, from prices by rising stiffness.
+
+    It is the lowest point of the parabola through the cheapest stiffness and its neighbours; the first or the last one
+    that was walked if that is the cheapest.
+    """
+    stiffness = list(walked)
+    cheapest = min(walked, key=lambda k: walked[k])
+    index = stiffness.index(cheapest)
+    around = stiffness[max(index - 1, 0) : index + 2]
+    if len(around) < 3:
+        return cheapest, walked[cheapest]
+    parabola = np.poly1d(np.polyfit(around, [walked[k] for k in around], 2))
+    best = float(-parabola.c[1] / (2.0 * parabola.c[0]))
+    return best, float(parabola(best))
+
+
 def rows_csv(rows: Sequence[Row]) -> str:
     """Return rows of the same columns as CSV text."""
     return csv_text(list(rows[0]), [list(row.values()) for row in rows])

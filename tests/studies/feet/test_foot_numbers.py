@@ -27,11 +27,12 @@ def test_numbers_are_those_of_the_evaluation():
 
 
 def test_feet_side_by_side_walk_as_alone_and_the_same_episodes():
-    feet = ["intact", {"kind": "weak", "strength": 0.3}]
+    weak = {"kind": "weak", "strength": 0.3}
+    feet = [{"right_foot": "intact"}, {"left_foot": weak, "right_foot": weak}]
     acting, settings = policy_and_settings("pretrained", {**SHORT, "unevenness_m": 0.01})
     together = record_feet(acting, settings, feet, name="x", episodes=2, seed=5)
-    for foot, recording in zip(feet, together, strict=True):
-        acting, settings = policy_and_settings("pretrained", {**SHORT, "unevenness_m": 0.01, "right_foot": foot})
+    for worn, recording in zip(feet, together, strict=True):
+        acting, settings = policy_and_settings("pretrained", {**SHORT, "unevenness_m": 0.01, **worn})
         alone = record(acting, settings, name="x", episodes=2, seed=5)
         assert recording.settings == alone.settings
         assert recording.returns.tobytes() == alone.returns.tobytes()
