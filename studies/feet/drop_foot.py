@@ -28,11 +28,11 @@ from .foot_numbers import numbers_of
 from .spring_map import with_walked_speed
 from .walked_speeds import Row, rows_csv
 
-SPEEDS = (0.8, 1.2, 1.6)
+DROP_SPEEDS = (0.8, 1.2, 1.6)
 """Commanded speeds [m/s]."""
-SPRINGS = (0.0, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0, 20.0, 40.0)
+SWING_SPRINGS = (0.0, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0, 20.0, 40.0)
 """Stiffness of the orthosis [N m/rad]."""
-RESTS = (-5.0, 0.0, 5.0, 10.0)
+SWING_RESTS = (-5.0, 0.0, 5.0, 10.0)
 """Rest angle of the orthosis, dorsiflexion positive [deg]."""
 
 
@@ -54,7 +54,7 @@ class DropFoot(WalkingStudy):
     @property
     def total(self) -> float:
         """Return the simulated time of all walks if none falls [s]."""
-        walks = 2 * len(self.policies) * len(self._speeds()) * len(SPRINGS) * len(RESTS)
+        walks = 2 * len(self.policies) * len(self._speeds()) * len(SWING_SPRINGS) * len(SWING_RESTS)
         return walks * self.episodes * self.seconds
 
     def ask(self, progress: OnProgress) -> Answer:
@@ -79,7 +79,7 @@ class DropFoot(WalkingStudy):
     def _walks(self, policy: str, progress: OnProgress) -> list[dict[str, Any]]:
         """Return a row for each speed, spring and rest angle."""
         rows = []
-        springs = list(product(SPRINGS, RESTS))
+        springs = list(product(SWING_SPRINGS, SWING_RESTS))
         feet = [
             {"right_foot": {"kind": "drop", "orthosis": {"ankle_stiffness": k, "ankle_deg": rest}}}
             for k, rest in springs
@@ -98,7 +98,7 @@ class DropFoot(WalkingStudy):
         return rows
 
     def _speeds(self) -> Sequence[float]:
-        return (1.2,) if self.quick else SPEEDS
+        return (1.2,) if self.quick else DROP_SPEEDS
 
 
 def weakest_cure(rows: Sequence[Row], column: str) -> Row | None:

@@ -1,5 +1,7 @@
 """The best spring of each case: planted prices, directions with their sign, and the same numbers twice."""
 
+from collections.abc import Mapping
+
 import pytest
 
 from springfoot.cli.main import study_main
@@ -9,7 +11,7 @@ from springfoot.studies.feet.spring_map import best_springs, best_table, directi
 from springfoot.studies.feet.walked_speeds import at_walked_speeds
 
 
-def priced(prices: dict[float, float | None], case=0.3, speed=1.1, policy="one") -> list[dict]:
+def priced(prices: Mapping[float, float | None], case=0.3, speed=1.1, policy="one") -> list[dict]:
     """Return rows at equal walked speed: fibre work by spring, and an effort that falls where it rises."""
     cell = {"policy": policy, "case": case, "speed_m_s": speed, "walked_m_s": speed}
     return [
