@@ -60,7 +60,6 @@ STUDIES = {
     "leg-tuning": ("searches.leg_tuning.LegTuning", "Which leg constants walk like people? (searches for hours)"),
     "plan-tuning": ("searches.plan_tuning.PlanTuning", "Which plan of a walk costs least effort? (searches)"),
     "predict": ("searches.predict.Predict", "Which walk follows from body, plan and physics alone? (searches, trains)"),
-    "leg-sets": ("searches.leg_sets.LegSets", "Do independent searches for leg constants find the same walk?"),
     "controls": ("feet.controls.Controls", "Does the price of a walk hold where its answer is known?"),
     "price": ("feet.price.Price", "How much does the price of a walk change with its tendons?"),
     "persons": ("feet.persons.Persons", "How do learned persons walk on drawn bodies and feet, and beside people?"),

@@ -88,9 +88,6 @@ class LegTuning(Study):
     """Seed of the search and of the walks."""
     threads: int = 2
     """Threads of the physics."""
-    keep: Literal["constants", "second", "front"] = "constants"
-    """Where to write the result: as the constants that walk, or beside them as a second search or a search at another
-    price."""
     constants: Annotated[Path, tyro.conf.arg(metavar="FILE")] = CONSTANTS
     """File of constants to read and to write."""
     plan_file: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = None
@@ -249,10 +246,8 @@ class LegTuning(Study):
         if self.quick:
             return
         known = read_constants(self.constants)  # anew: another search may have written its constants
-        name = f"{name}, --foreign {self.foreign:g}" if self.keep == "front" else name
-        known.setdefault(self.keep, {})[name] = asdict(constants)
-        label = f"{name}, second search" if self.keep == "second" else name
-        known.setdefault("found_by", {})[label] = self.command
+        known["constants"][name] = asdict(constants)
+        known.setdefault("found_by", {})[name] = self.command
         write_constants(self.constants, known)
 
 

@@ -23,8 +23,7 @@ from springfoot.errors import SpringfootError
 
 def test_every_set_of_constants_says_what_found_it():
     table = json.loads(resources.files("springfoot.envs.control").joinpath("legs.json").read_text(encoding="utf-8"))
-    second = {f"{name}, second search" for name in table.get("second", {})}
-    assert set(table["found_by"]) == set(table["constants"]) | second | set(table.get("front", {}))
+    assert set(table["found_by"]) == set(table["constants"])
     for equilibrium, cadence in (("planned", "people"), ("planned", "thesis"), ("neutral", "people")):
         name = constants_name(equilibrium, cadence)
         assert table["found_by"][name].startswith("springfoot study leg-tuning")

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from springfoot.cli.main import study_main
-from springfoot.envs.control.constants import constants_from, leg_constants
+from springfoot.envs.control.constants import leg_constants
 from springfoot.envs.control.legs import KNOTS
 from springfoot.envs.settings.settings import BipedSettings
 from springfoot.evaluation import measure, policy_and_settings, record
@@ -62,18 +62,6 @@ def test_one_step_brings_the_whole_target_of_a_joint_earlier(place, joint, curve
     earlier = human.mean(curve, KNOTS + LEAD_STEP) - human.mean(curve, KNOTS)
     assert added == pytest.approx(np.rad2deg(earlier), abs=0.2)  # to first order; the knee moves 1.5 deg
     assert replace(led, **{name: getattr(COMMITTED, name)}) == COMMITTED
-
-
-def test_the_planned_set_is_made_of_two_searches_as_its_note_says():
-    sets = tuning.read_constants(tuning.CONSTANTS)["front"]
-    two = [sets[name] for name in ("planned, targets later", "planned, less hip work")]
-    mean = {name: np.mean([each[name] for each in two], axis=0).tolist() for name in two[0]}
-    search = Search(constants_from(mean))
-    vector = np.zeros(search.size)
-    vector[-2] = 0.8
-    made = asdict(search.constants(vector))
-    for name, value in asdict(COMMITTED).items():
-        assert made[name] == pytest.approx(value, abs=2e-5), name
 
 
 def test_legs_like_peoples_pay_less_than_legs_farther_off_and_those_less_than_legs_that_fall():
@@ -146,15 +134,6 @@ def test_bad_input_is_one_line_exit_code_2_and_nothing_written(monkeypatch, caps
     out, error = capsys.readouterr()
     assert said in error and error.count("\n") == 1 and not out
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
-
-
-def test_a_search_at_another_price_is_kept_beside_the_constants_that_walk(constants):
-    before = json.loads(constants.read_text())
-    words = ["--generations", "1", "--population", "2", "--threads", "1", "--foreign", "0", "--keep", "front"]
-    assert run(*words, "--constants", constants, "--out", constants.parent / "out") == 0
-    after = json.loads(constants.read_text())
-    assert after["constants"] == before["constants"]
-    assert set(after["front"]["planned, --foreign 0"]) == set(asdict(COMMITTED))
 
 
 def test_a_search_pushes_from_a_generation_on(constants):
