@@ -1,4 +1,4 @@
-"""Draw the body of a live walk in 3-D: capsules and spheres, the ground that runs below, arrows of its ground forces.
+"""Draw the body of a live walk in 3-D: capsules, spheres and the box of a load, the ground that runs below, arrows of its ground forces.
 
 The body stays in the middle of the picture, however far it walks: ground and forces are shifted back by the distance.
 Meshes are coarse, and lights cast no shadow and reflect nothing, so that a browser without a GPU can draw them.
@@ -104,7 +104,7 @@ class LiveScene:
         )
 
     def _add_geom(self, geom: int) -> None:
-        """Draw the capsule or sphere with the number `geom` in the model, on its body."""
+        """Draw the capsule, sphere or box with the number `geom` in the model, on its body."""
         model = self._model
         radius, half_length = model.geom_size[geom, :2]
         name = f"{_name(model.geom_bodyid[geom])}/{geom}"
@@ -113,6 +113,8 @@ class LiveScene:
         if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_CAPSULE:
             mesh = trimesh.creation.capsule(2.0 * half_length, radius, count=(ROUND // 2, ROUND))
             self._server.scene.add_mesh_simple(name, mesh.vertices, mesh.faces, color=colour, **pose)
+        elif model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_BOX:
+            self._server.scene.add_box(name, colour, 2.0 * model.geom_size[geom], **pose)
         else:
             self._server.scene.add_icosphere(name, radius, colour, subdivisions=2, **pose)
 

@@ -19,7 +19,7 @@ from springfoot.envs.batch.walk import Walked, walked_steps
 from springfoot.envs.control.equilibrium import foot_curves
 from springfoot.envs.control.reference_walk import reference_walk_at, rows, tabulated_speeds
 from springfoot.envs.control.stiffness_control import FEET, action_of, stiffness_of
-from springfoot.envs.physics.model import SIDES
+from springfoot.envs.physics.model import ACTIONS, SIDES
 from springfoot.envs.physics.simulation import MjData, MjModel
 from springfoot.envs.settings.checks import LONGEST_EPISODE
 from springfoot.envs.settings.settings import BipedSettings, body_of
@@ -29,6 +29,7 @@ from springfoot.gait.body.body import Body
 from springfoot.gait.springs.stiffness import SPRINGS
 
 from ..recording.policies import policy_and_settings
+from .foot_entries import PlainFoot, entry_of, with_entry
 
 Source = Literal["policy", "scaled", "by hand"]
 """Source of K: the policy, the policy times a factor, or a number that the user sets."""
@@ -51,7 +52,7 @@ ELSEWHERE = {
     "height_range": "the slider height sets it",
     "mass_range": "the slider mass sets it",
     "drawn_bodies": "its proportions stay",
-    "drawn_feet": "the menus set the feet",
+    "drawn_feet": "menus and sliders set the feet",
     "speed_range": "the slider speed sets it",
     "speed_interval": "the slider speed sets it",
     "slope_range_deg": "the slider slope sets it",
@@ -65,7 +66,11 @@ LYING_SECONDS = 1.0
 
 @dataclass(frozen=True, kw_only=True)
 class Wishes:
-    """The user's wishes for a live walk. Slope, body and feet restart it; all others act while it runs."""
+    """The user's wishes for a live walk. Slope, body and feet restart it; all others act while it runs.
+
+    The name of a wish is its field, or for an entry of a foot its path (`foot_entries`), as in
+    `left_foot.ankle_stiffness`.
+    """
 
     ankle_source: Source = "policy"
     toe_source: Source = "policy"
@@ -84,14 +89,32 @@ class Wishes:
     slope_deg: float = BipedSettings.slope_deg
     height: float = BipedSettings.height
     mass: float = BipedSettings.mass
-    left_foot: str | dict[str, Any] = "intact"
-    right_foot: str | dict[str, Any] = "intact"
+    carried_ratio: float = BipedSettings.carried_ratio
+    left_foot: PlainFoot = "intact"
+    right_foot: PlainFoot = "intact"
+
+    def named(self, name: str) -> Any:
+        """Return the wish of this name."""
+        setting, _, path = name.partition(".")
+        wish = getattr(self, setting)
+        return entry_of(wish, path) if path else wish
+
+    def changed(self, wishes: dict[str, Any]) -> "Wishes":
+        """Return these wishes with others of the given names, unchecked."""
+        new_wishes = self
+        for name, wish in wishes.items():
+            setting, _, path = name.partition(".")
+            value = with_entry(getattr(new_wishes, setting), path, wish) if path else wish
+            new_wishes = replace(new_wishes, **{setting: value})
+        return new_wishes
 
 
 OFFSETS = ("ankle_offset_deg", "toe_offset_deg")
 """Wishes that move theta_eq."""
-ANEW = ("slope_deg", "height", "mass", "left_foot", "right_foot")
+ANEW = ("slope_deg", "height", "mass", "carried_ratio", "left_foot", "right_foot")
 """Wishes that restart the walk."""
+OF_BODY = ("height", "mass", "carried_ratio")
+"""Wishes about the body."""
 WISH_RANGES = {
     "ankle_factor": LIVE_FACTORS,
     "toe_factor": LIVE_FACTORS,
@@ -149,6 +172,7 @@ class LiveSession:
         settings = (given or {}) | fixed | {"episode_seconds": LONGEST_EPISODE}
         self._policy, self._settings = policy_and_settings(policy, settings, seed)
         self.name = policy
+        self._sets_stiffness = self._settings.acts != "person" and self._settings.stiffness_by == "action"
         self._seed = seed
         self._push_force = 0.0  # of the last push [N]
         self._push_steps = 0  # steps for which it still acts
@@ -172,7 +196,14 @@ class LiveSession:
     @property
     def body(self) -> Body:
         """The body of the walk."""
-        return body_of(replace(self._settings, height=self.wishes.height, mass=self.wishes.mass))
+        return body_of(replace(self._settings, **{name: getattr(self.wishes, name) for name in OF_BODY}))
+
+    @property
+    def person(self) -> str:
+        """The name of the learned person who walks: of the setting `person`, or the policy that is one; "" for none."""
+        if self._settings.acts != "stiffness":
+            return self.name
+        return "" if self._settings.person == "tuned" else self._settings.person
 
     @property
     def model(self) -> MjModel:
@@ -191,7 +222,7 @@ class LiveSession:
     def ask(self, **wishes: Any) -> None:
         """Change wishes, given by name, and the walk with them; raise `SpringfootError`, with nothing changed, for
         impossible ones."""
-        new_wishes = replace(self.wishes, **wishes)
+        new_wishes = self.wishes.changed(wishes)
         self._check(new_wishes)
         before = self.wishes
         biped = self._biped
@@ -285,9 +316,12 @@ class LiveSession:
         return np.concatenate([cop, force.sum(axis=1) / (self.body.total_mass * GRAVITY)], axis=-1)
 
     def _action(self, observation: NDArray) -> NDArray:
-        """Return the action (1, 4) that gives the wished K; joints with the source `policy` keep the policy's."""
-        action = np.asarray(self._policy(observation), float).reshape(len(SIDES), len(SPRINGS))
+        """Return the action (1, A) that gives the wished K; joints with the source `policy` keep the policy's."""
+        whole = np.array(self._policy(observation), float).reshape(1, -1)
         settings = self._settings
+        if settings.acts == "person":  # and sets no stiffness
+            return whole
+        action = whole[:, : len(ACTIONS)].reshape(len(SIDES), len(SPRINGS))  # a view; what acts as a person follows
         body = self.body
         wishes = self.wishes
         residual = settings.action_mode == "residual"
@@ -304,16 +338,17 @@ class LiveSession:
                     stiffness[:, joint] = getattr(wishes, f"{name}_stiffness")
             joint_action = np.log(stiffness / schedule) if residual else action_of(stiffness, settings, body)
             action[:, joint] = np.clip(joint_action[:, joint], -1.0, 1.0)
-        return action.reshape(1, -1)
+        return whole
 
     def _make(self, wishes: Wishes) -> Biped:
-        """Return a batch of one body on the ground and feet of `wishes`, its rest angles offset as wished.
+        """Return a batch of one body on the ground, with the load and on the feet of `wishes`, its rest angles offset
+        as wished.
 
         Its reset decides on height, mass and speed.
         """
         offset = _offset(wishes)
-        slope_and_feet = {name: getattr(wishes, name) for name in ("slope_deg", "left_foot", "right_foot")}
-        settings = replace(self._settings, **slope_and_feet)
+        fixed = ("slope_deg", "carried_ratio", "left_foot", "right_foot")
+        settings = replace(self._settings, **{name: getattr(wishes, name) for name in fixed})
         if not offset.any():
             return Biped(settings, 1)
         # The wished body's speed at the Froude number of the settings' body, within the tabulated speeds.
@@ -327,8 +362,12 @@ class LiveSession:
         """Raise `SpringfootError` for wishes outside their ranges."""
         for name, (low, high) in WISH_RANGES.items():
             require_number(name, getattr(wishes, name), low, high)
-        for name in ("ankle_stiffness", "toe_stiffness"):
+        for joint in SPRINGS:
+            name = f"{joint}_stiffness"
             require_number(name, getattr(wishes, name), 0.0, inf, "N m/rad", above=True)
+            source = getattr(wishes, f"{joint}_source")
+            if source != "policy" and not self._sets_stiffness:
+                raise SpringfootError(f"{joint}_source must be 'policy': its actions set no K, got {source!r}")
         replace(self._settings, **{name: getattr(wishes, name) for name in ANEW})  # the settings check the rest
 
 

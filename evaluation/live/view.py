@@ -19,11 +19,13 @@ import viser
 from viser import uplot
 
 from springfoot.envs.physics.model import SIDES
-from springfoot.envs.settings.feet import KINDS
+from springfoot.envs.settings.feet import FOOT_SETTINGS, KINDS
 from springfoot.envs.settings.settings import SLOPE_RANGE_DEG
 from springfoot.errors import printable
+from springfoot.gait.body.body import CARRIED_RATIO_RANGE
 from springfoot.gait.springs.stiffness import SPRINGS
 
+from .foot_entries import KIND, ORTHOSIS, ORTHOSIS_WAYS, WAY, has_entry, range_of
 from .messages import accept_values_only
 from .origin import own_pages_only
 from .scene import LiveScene, fit_to_screen
@@ -47,6 +49,15 @@ LATE = 0.25
 """Delay after which the clock stops catching up [s]; chosen."""
 FIRST_PUSH = 150.0
 """Initial push of the slider [N]."""
+FOOT_SLIDERS = {
+    "ankle_stiffness": ("ankle K, N·m/rad", 10.0),
+    "ankle_deg": ("ankle θ_eq, deg", 0.5),
+    "toe_stiffness": ("toe K, N·m/rad", 5.0),
+    "strength": ("strength", 0.05),
+    f"{ORTHOSIS}.ankle_stiffness": ("orthosis K, N·m/rad", 10.0),
+    f"{ORTHOSIS}.ankle_deg": ("orthosis θ_eq, deg", 0.5),
+}
+"""Path of a foot's number -> label and step of its slider."""
 SIDE_COLOURS = ("#0072B2", "#D55E00")
 """Colours of left and right."""
 
@@ -134,11 +145,12 @@ class LiveView:
                     request()
             if wishes:
                 self._session.ask(**wishes)
+                self._fit_inputs_to_feet(wishes)
         except Exception as error:  # a walk outlives whatever a message asks
             for client in self._server.get_clients().values():
                 client.add_notification("This cannot be", printable(str(error)), auto_close_seconds=8.0, color="red")
             for name in wishes:
-                self._handles[name].value = _shown(getattr(self._session.wishes, name))
+                self._handles[name].value = self._session.wishes.named(name)
 
     def _add_buttons(self) -> None:
         """Add the buttons Push, Restart and page colour, and the slider of the push."""
@@ -171,21 +183,41 @@ class LiveView:
         with self._gui.add_folder("Walk"):
             self._add_slider("speed", "speed, m/s", LIVE_SPEEDS, 0.05)
             self._add_slider("slope_deg", "slope, deg", SLOPE_RANGE_DEG, 0.5)
-        with self._gui.add_folder("Body and feet"):
+        with self._gui.add_folder("Body"):
             self._add_slider("height", "height, m", LIVE_HEIGHTS, 0.01)
             self._add_slider("mass", "mass, kg", LIVE_MASSES, 1.0)
-            for side in SIDES:
-                self._add_list(f"{side}_foot", f"{side} foot", tuple(KINDS))
+            self._add_slider("carried_ratio", "load, of the mass", CARRIED_RATIO_RANGE, 0.05)
+        for side, setting in zip(SIDES, FOOT_SETTINGS, strict=True):
+            with self._gui.add_folder(f"{side.capitalize()} foot"):
+                self._add_list(f"{setting}.{KIND}", "kind", tuple(KINDS))
+                for path, (label, step) in FOOT_SLIDERS.items():
+                    self._add_slider(f"{setting}.{path}", label, range_of(path), step)
+                self._add_list(f"{setting}.{WAY}", "orthosis acts in", ORTHOSIS_WAYS)
+        self._fit_inputs_to_feet({})
+
+    def _fit_inputs_to_feet(self, wishes: dict[str, Any]) -> None:
+        """Show the inputs that do something on the present feet, and hide the others.
+
+        With another kind among the `wishes` that have just been granted, the numbers of that foot begin anew.
+        """
+        present = self._session.wishes
+        for setting in FOOT_SETTINGS:
+            for path in (*FOOT_SLIDERS, WAY):
+                name = f"{setting}.{path}"
+                handle = self._handles[name]
+                handle.visible = has_entry(getattr(present, setting), path)
+                if f"{setting}.{KIND}" in wishes:
+                    handle.value = present.named(name)
 
     def _add_slider(self, name: str, label: str, ends: tuple[float, float], step: float) -> None:
         """Add a slider for the wish `name`, from end to end in steps."""
-        value = float(np.clip(getattr(self._session.wishes, name), *ends))
+        value = float(np.clip(self._session.wishes.named(name), *ends))
         self._handles[name] = self._gui.add_slider(label, *map(float, ends), step=step, initial_value=value)
         self._listen(name)
 
     def _add_list(self, name: str, label: str, options: tuple[str, ...]) -> None:
         """Add a list of options for the wish `name`."""
-        value = _shown(getattr(self._session.wishes, name))
+        value = self._session.wishes.named(name)
         self._handles[name] = self._gui.add_dropdown(label, options, initial_value=value)
         self._listen(name)
 
@@ -232,8 +264,11 @@ class LiveView:
             )
         )
         state = f"**fell: {last_frame.fell}**" if last_frame.fell else f"{last_frame.speed:.2f} m/s"
+        person = f"person {_plain(session.person)}" if session.person else ""
+        policy = _plain(session.name) if session.person != session.name else ""
+        who = ", ".join(filter(None, (policy, person)))
         self._words.content = (
-            f"{_plain(session.name)}: {last_frame.time:.1f} s, {state}, falls: {session.falls}\n\n"
+            f"{who}: {last_frame.time:.1f} s, {state}, falls: {session.falls}\n\n"
             "| K that acts, N·m/rad | ankle | toe | ankle θ_eq, deg | toe θ_eq, deg |\n|-|-|-|-|-|\n" + rows
         )
         seconds = session.dt * np.arange(1 - len(self._history), 1)  # up to 0, the last step
@@ -256,8 +291,3 @@ def _set_theme(gui: viser.GuiApi, dark: bool = False) -> None:
 def _plain(name: str) -> str:
     """Return a name as Markdown that shows it as it is: no link, no HTML."""
     return re.sub(r"([!-/:-@\[-`{-~])", r"\\\1", name)
-
-
-def _shown(wish: Any) -> Any:
-    """Return the value of a wish for its slider or list: of a foot, its kind."""
-    return wish["kind"] if isinstance(wish, dict) else wish

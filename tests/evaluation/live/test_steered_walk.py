@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from springfoot.envs.batch.biped_batch import Biped
+from springfoot.envs.physics.foot import INTACT
 from springfoot.errors import SpringfootError
+from springfoot.evaluation.live.foot_entries import has_entry, with_entry
 from springfoot.evaluation.live.steered_walk import LYING_SECONDS, LiveSession
 
 
@@ -117,6 +119,12 @@ def test_speed_changes_under_way_and_slope_body_and_feet_begin_anew():
         ({"ankle_source": "scaled", "ankle_factor": 0.0}, "ankle_factor must be a finite number >= 0.25"),
         ({"slope_deg": 9.0}, "slope_deg must be a finite number >= -5"),
         ({"toe_stiffness": float("nan")}, "toe_stiffness must be a finite number > 0"),
+        ({"carried_ratio": 0.5}, r"carried_ratio must be in \[0, 0.4\]"),
+        ({"left_foot.kind": "wood"}, "left_foot must be one of"),
+        ({"left_foot.kind": "weak", "left_foot.strength": 0.9}, r"left_foot: strength must be in \[0.1, 0.6\]"),
+        ({"left_foot.ankle_stiffness": 300.0}, "left_foot: a foot of kind 'intact' has no 'ankle_stiffness'"),
+        ({"right_foot.orthosis.ankle_stiffness": -1.0}, r"right_foot: orthosis: ankle_stiffness must be in \[0"),
+        ({"right_foot.orthosis.engages": "up"}, "right_foot: orthosis: engages must be one of"),
     ],
 )
 def test_what_cannot_be_is_refused_and_nothing_changes(walking, wish, said):
@@ -166,3 +174,112 @@ def test_settings_begin_where_flags_say_and_pushes_come_by_hand_alone():
 def test_settings_that_a_live_walk_would_ignore_are_refused(name, value, instead):
     with pytest.raises(SpringfootError, match=f"^live takes no {name}: {instead}$"):
         LiveSession("schedule", {name: value})
+
+
+@pytest.fixture(scope="module")
+def with_person():
+    """A learned person whose stiffness is the schedule's."""
+    return LiveSession("schedule", {"person": "learned"})
+
+
+@pytest.mark.parametrize(
+    ("foot", "wish", "joint", "read", "value"),
+    [
+        ("passive", {"left_foot.ankle_stiffness": 300.0}, "ankle", "device.stiffness", 300.0),
+        ("passive", {"left_foot.ankle_deg": 6.0}, "ankle", "device.rest", np.radians(6.0)),
+        ("passive", {"left_foot.toe_stiffness": 90.0}, "toe", "device.stiffness", 90.0),
+        ("adaptive", {"left_foot.ankle_deg": 5.0}, "ankle", "rest", np.radians(5.0)),
+        ("weak", {"left_foot.strength": 0.5}, "ankle", "strength", 0.5),
+        ("intact", {"left_foot.orthosis.ankle_stiffness": 200.0}, "ankle", "orthosis.stiffness", 200.0),
+        (
+            {"kind": "weak", "orthosis": {"ankle_stiffness": 200.0}},
+            {"left_foot.orthosis.ankle_deg": -4.0},
+            *("ankle", "orthosis.rest", np.radians(-4.0)),
+        ),
+        (
+            {"kind": "drop", "orthosis": {"ankle_stiffness": 50.0}},
+            {"left_foot.orthosis.engages": "plantarflexion"},
+            *("ankle", "orthosis.engages", "plantarflexion"),
+        ),
+        (
+            {"kind": "drop", "orthosis": {"ankle_stiffness": 50.0, "engages": "dorsiflexion"}},
+            {"left_foot.orthosis.engages": "both ways"},
+            *("ankle", "orthosis.engages", None),
+        ),
+    ],
+)
+def test_an_entry_of_a_foot_is_worn_on_that_side_and_the_walk_begins_anew(with_person, foot, wish, joint, read, value):
+    session = with_person
+    session.ask(left_foot=foot, right_foot="intact")
+    walk(session, 3)
+    session.ask(**wish)
+    assert session.frame.time == 0.0
+    left, right = session._biped.feet[0]
+    worn = getattr(left, joint)
+    for name in read.split("."):
+        worn = getattr(worn, name)
+    assert worn == (value if value is None or isinstance(value, str) else pytest.approx(value))
+    assert right == INTACT
+    assert walk(session, 3).fell == ""
+
+
+def test_sliders_of_a_passive_foot_set_the_k_that_acts_in_mujoco(with_person):
+    session = with_person
+    session.ask(left_foot="intact", right_foot="intact")
+    session.ask(**{"right_foot.kind": "passive", "right_foot.ankle_stiffness": 310.0, "right_foot.toe_stiffness": 45.0})
+    assert session.step().stiffness[1] == pytest.approx([310.0, 45.0])
+    assert np.array_equal(session.frame.stiffness, acting(session))
+
+
+def test_another_kind_keeps_orthosis_and_segments_and_forgets_other_numbers(with_person):
+    kept = {"shank_mass_ratio": 0.8, "orthosis": {"ankle_stiffness": 100.0, "engages": "dorsiflexion"}}
+    session = with_person
+    session.ask(left_foot={"kind": "passive", "ankle_stiffness": 400.0, **kept})
+    session.ask(**{"left_foot.kind": "weak"})
+    assert session.wishes.left_foot == {"kind": "weak", **kept}
+    session.ask(**{"left_foot.kind": "passive"})
+    assert session.wishes.named("left_foot.ankle_stiffness") == 600.0
+
+
+def test_an_orthosis_without_stiffness_is_none(twins):
+    session, left_alone = twins
+    session.ask(**{"left_foot.orthosis.ankle_stiffness": 0.0})
+    assert walk(session, 30).speed == walk(left_alone, 30).speed
+
+
+def test_a_load_is_carried(with_person):
+    session = with_person
+    session.ask(mass=60.0, carried_ratio=0.2)
+    assert session.model.body_mass.sum() == pytest.approx(72.0, rel=1e-6) and session.body.total_mass == 72.0
+    frames = [session.step() for _ in range(150)]
+    lifted = np.mean([frame.force[:, 3].sum() for frame in frames[50:]])  # of the weight of body and load
+    assert frames[-1].fell == "" and lifted == pytest.approx(1.0, abs=0.05)
+    session.ask(mass=63.0, carried_ratio=0.0)
+    assert session.model.body_mass.sum() == pytest.approx(63.0, rel=1e-6)
+
+
+@pytest.mark.parametrize("foot", [{"kind": "passive", "ankle_table": [[-10, 100], [20, -100]]}, "intact", "weak"])
+def test_entries_that_do_nothing_are_not_offered(foot):
+    kind = foot if isinstance(foot, str) else foot["kind"]
+    offered = {path for path in ("ankle_stiffness", "ankle_deg", "toe_stiffness", "strength") if has_entry(foot, path)}
+    assert offered == {"passive": {"toe_stiffness"}, "intact": set(), "weak": {"strength"}}[kind]
+    assert has_entry(foot, "orthosis.ankle_stiffness") and not has_entry(foot, "orthosis.ankle_deg")
+    braced = with_entry(foot, "orthosis.ankle_stiffness", 50.0)
+    assert has_entry(braced, "orthosis.ankle_deg") and has_entry(braced, "orthosis.engages")
+
+
+def test_a_person_may_be_the_policy_or_walk_under_one(with_person):
+    assert with_person.person == "learned" and LiveSession("schedule").person == ""
+    session = LiveSession("learned")
+    assert session.person == "learned"
+    walk(session, 100)
+    assert session.frame.fell == "" and session.frame.speed > 0.8
+    session.ask(ankle_source="by hand", ankle_stiffness=260.0)
+    assert session.step().stiffness[:, 0] == pytest.approx(260.0)
+    assert np.any(session._action(session._biped.observe())[0, 4:])  # the person still acts
+
+
+def test_k_is_not_taken_by_hand_from_a_policy_that_sets_none():
+    session = LiveSession("learned", {"stiffness_by": "schedule"})
+    with pytest.raises(SpringfootError, match="^toe_source must be 'policy': its actions set no K, got 'scaled'$"):
+        session.ask(toe_source="scaled")
