@@ -1,4 +1,4 @@
-"""Draw the body of a live walk in 3-D: capsules, spheres and the box of a load, the ground that runs below, arrows of its ground forces.
+"""Draw the body of a live walk in 3-D: its segments and load, the ground that runs below, arrows of its ground forces.
 
 The body stays in the middle of the picture, however far it walks: ground and forces are shifted back by the distance.
 Meshes are coarse, and lights cast no shadow and reflect nothing, so that a browser without a GPU can draw them.

@@ -264,11 +264,8 @@ class LiveView:
             )
         )
         state = f"**fell: {last_frame.fell}**" if last_frame.fell else f"{last_frame.speed:.2f} m/s"
-        person = f"person {_plain(session.person)}" if session.person else ""
-        policy = _plain(session.name) if session.person != session.name else ""
-        who = ", ".join(filter(None, (policy, person)))
         self._words.content = (
-            f"{who}: {last_frame.time:.1f} s, {state}, falls: {session.falls}\n\n"
+            f"{_walker(session.name, session.person)}: {last_frame.time:.1f} s, {state}, falls: {session.falls}\n\n"
             "| K that acts, N·m/rad | ankle | toe | ankle θ_eq, deg | toe θ_eq, deg |\n|-|-|-|-|-|\n" + rows
         )
         seconds = session.dt * np.arange(1 - len(self._history), 1)  # up to 0, the last step
@@ -286,6 +283,12 @@ class LiveView:
 def _set_theme(gui: viser.GuiApi, dark: bool = False) -> None:
     """Make the page of `gui`, of one browser or of all, light or dark, without viser's own marks."""
     gui.configure_theme(show_logo=False, show_share_button=False, control_width="large", dark_mode=dark)
+
+
+def _walker(policy: str, person: str) -> str:
+    """Return who walks, in Markdown: the policy, and the learned person ("" for none), who may be the policy."""
+    names = {policy: _plain(policy)} | ({person: f"person {_plain(person)}"} if person else {})
+    return ", ".join(names.values())
 
 
 def _plain(name: str) -> str:

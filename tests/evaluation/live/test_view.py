@@ -153,7 +153,16 @@ def test_a_walk_outlives_any_message(view, count):
         }
         assert type(handle.value) is kind and (kind is not float or handle.min <= handle.value <= handle.max)
     assert np.isfinite(session.frame.stiffness).all()
-    for name in ("height", "mass", "slope_deg", "left_foot", "right_foot", "ankle_source", "toe_source"):
+    for name in (
+        "height",
+        "mass",
+        "carried_ratio",
+        "slope_deg",
+        "left_foot",
+        "right_foot",
+        "ankle_source",
+        "toe_source",
+    ):
         default = getattr(session.wishes, name)
         assert default is not None
 
@@ -168,6 +177,45 @@ def test_a_policys_name_is_text(view):
     from springfoot.evaluation.live.view import _plain
 
     assert _plain("<b>[a](http://b.invalid)") == r"\<b\>\[a\]\(http\:\/\/b\.invalid\)"
+
+
+@pytest.mark.parametrize(
+    ("policy", "person", "said"),
+    [
+        ("schedule", "", "schedule"),
+        ("schedule", "learned", "schedule, person learned"),
+        ("learned", "learned", "person learned"),
+    ],
+)
+def test_the_page_says_who_walks(policy, person, said):
+    from springfoot.evaluation.live.view import _walker
+
+    assert _walker(policy, person) == said
+
+
+def test_inputs_of_feet_are_there_where_they_do_something_and_a_load_is_a_box(view):
+    handles = view._handles
+    drawn = view._server.scene._handle_from_node_name
+
+    def shown(setting):
+        return {name.partition(".")[2] for name in handles if name.startswith(setting + ".") and handles[name].visible}
+
+    everywhere = {"kind", "orthosis.ankle_stiffness"}
+    assert shown("left_foot") == shown("right_foot") == everywhere
+    view._requests.put({"left_foot.kind": "passive"})
+    view._requests.put({"left_foot.ankle_stiffness": 450.0, "carried_ratio": 0.1})
+    assert reaches(lambda: shown("left_foot") == everywhere | {"ankle_stiffness", "ankle_deg", "toe_stiffness"})
+    assert handles["left_foot.ankle_stiffness"].value == 450.0
+    assert reaches(lambda: any(isinstance(handle, viser.BoxHandle) for handle in list(drawn.values())))
+    view._requests.put({"left_foot.kind": "weak", "left_foot.orthosis.ankle_stiffness": 90.0})
+    of_orthosis = {"orthosis.ankle_deg", "orthosis.engages"}
+    assert reaches(lambda: shown("left_foot") == everywhere | {"strength"} | of_orthosis)
+    assert handles["left_foot.strength"].value == 0.3
+    view._requests.put({"left_foot.strength": 0.9})
+    handles["left_foot.strength"].value = 0.6
+    assert reaches(lambda: handles["left_foot.strength"].value == 0.3)  # back, as it cannot be
+    view._requests.put({"left_foot": "intact", "carried_ratio": 0.0})
+    assert reaches(lambda: shown("left_foot") == everywhere)
 
 
 def test_only_this_machine_reaches_it_unless_told_otherwise(view):
