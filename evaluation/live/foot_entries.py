@@ -70,8 +70,8 @@ def has_entry(foot: PlainFoot, path: str) -> bool:
 
 def _entries(foot: PlainFoot) -> dict[str, Any]:
     """Return all entries of a foot by their paths."""
-    plain = {KIND: foot} if isinstance(foot, str) else dict(foot)
-    orthosis = plain.pop(ORTHOSIS, None) or {}
+    plain: dict[str, Any] = {KIND: foot} if isinstance(foot, str) else dict(foot)
+    orthosis: dict[str, Any] = plain.pop(ORTHOSIS, None) or {}
     return plain | {f"{ORTHOSIS}.{name}": value for name, value in orthosis.items()}
 
 

@@ -54,7 +54,7 @@ FOOT_SLIDERS = {
     "ankle_deg": ("ankle θ_eq, deg", 0.5),
     "toe_stiffness": ("toe K, N·m/rad", 5.0),
     "strength": ("strength", 0.05),
-    f"{ORTHOSIS}.ankle_stiffness": ("orthosis K, N·m/rad", 10.0),
+    f"{ORTHOSIS}.ankle_stiffness": ("orthosis, N·m/rad", 10.0),
     f"{ORTHOSIS}.ankle_deg": ("orthosis θ_eq, deg", 0.5),
 }
 """Path of a foot's number -> label and step of its slider."""
@@ -186,7 +186,7 @@ class LiveView:
         with self._gui.add_folder("Body"):
             self._add_slider("height", "height, m", LIVE_HEIGHTS, 0.01)
             self._add_slider("mass", "mass, kg", LIVE_MASSES, 1.0)
-            self._add_slider("carried_ratio", "load, of the mass", CARRIED_RATIO_RANGE, 0.05)
+            self._add_slider("carried_ratio", "carried, of mass", CARRIED_RATIO_RANGE, 0.05)
         for side, setting in zip(SIDES, FOOT_SETTINGS, strict=True):
             with self._gui.add_folder(f"{side.capitalize()} foot"):
                 self._add_list(f"{setting}.{KIND}", "kind", tuple(KINDS))
