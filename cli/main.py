@@ -20,7 +20,7 @@ FIRST = """To begin with:
 
   springfoot live pretrained            watch a walk in your browser, and steer it
   springfoot evaluate pretrained        how human is it? numbers, curves, and report.html
-  springfoot train --out runs/mine      train a policy of your own, two to three minutes on two cores
+  springfoot train --out runs/mine      train a policy of your own, three to ten minutes on two cores
   springfoot evaluate runs/mine         how human is yours?
   springfoot examples --copy examples   programs to start from
 

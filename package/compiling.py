@@ -5,7 +5,7 @@ import sys
 from numba.core import event
 from tqdm import tqdm
 
-NOTICE = "compiling kernels, once per installation: up to half a minute"
+NOTICE = "compiling kernels that no command has needed before: up to half a minute"
 """Line on standard error before the first compilation."""
 
 

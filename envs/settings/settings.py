@@ -189,7 +189,8 @@ class BipedSettings:
     knees and ankles, every 20 ms; or both (`springfoot.envs.control.person_actions`)."""
     person: str = field(default="tuned", metadata=_PERSON)
     """Who walks where the action sets stiffness alone: the tuned rest angles (tuned); the package's person, who has
-    learned other feet, bodies and slopes (learned); or another one, a policy file of `train.py --preset person`."""
+    learned other feet, bodies and slopes (learned); or another one, a policy file of
+    `springfoot train --preset person`."""
     person_range_deg: float = field(default=14.0, metadata=_PERSON)
     """Largest offset of a rest angle, that of an action of 1 [0..30 deg]."""
     stiffness_by: StiffnessBy = field(default="action", metadata=_PERSON | _REPLACED)

@@ -80,14 +80,15 @@ def _print_head(walks: Sequence[dict[str, Any]], console: Console) -> None:
 
 
 def _world(metrics: dict[str, Any]) -> str:
-    """Return in words the body, speed, rest angles and pushes of an evaluation, and on a line below feet that
-    differ."""
+    """Return in words the body, speed, rest angles, learned person and pushes of an evaluation; on a line below
+    feet that differ."""
     environment = metrics["environment"]
     pushes = f", pushes ±{environment['push_newton']:g} N" if environment["push_newton"] else ""
+    person = "" if environment["person"] == "tuned" else f", person {Path(environment['person']).stem}"
     feet = ", ".join(f"{side} {kind}" for side, kind in metrics["feet"].items())
     return (
         f"{environment['height']:g} m, {environment['mass']:g} kg, {environment['speed']:g} m/s, "
-        f"springs' rest angles {environment['equilibrium']}{pushes}"
+        f"springs' rest angles {environment['equilibrium']}{person}{pushes}"
     ) + ("" if metrics["per_leg"] is None else f"\nfeet: {feet}")
 
 
