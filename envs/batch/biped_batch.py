@@ -330,11 +330,11 @@ class Biped(ExactState):
         if action.shape != (self.num_envs, len(self.action_names)):
             expected = self.num_envs, len(self.action_names)
             raise SpringfootError(f"actions must have shape {expected}, got {action.shape}")
-        # The stiffness comes first, the person after it; either may be missing.
-        of_stiffness = np.zeros((self.num_envs, len(ACTIONS)))
-        if self._acts_on_stiffness:
-            of_stiffness = np.ascontiguousarray(action[:, : len(ACTIONS)])
-        of_person = action[:, -len(PERSON_ACTIONS) :] if self._acts_as_person else None
+        of_stiffness, of_person = action, None
+        if self._acts_as_person:  # behind the actions on the stiffness, if any
+            of_person = action[:, -len(PERSON_ACTIONS) :]
+            none = np.zeros((self.num_envs, len(ACTIONS)))
+            of_stiffness = np.ascontiguousarray(action[:, : len(ACTIONS)]) if self._acts_on_stiffness else none
         finite = of_person is None or np.isfinite(of_person[running]).all()
         taken = self._decisions.take(of_stiffness, running) if finite else None
         if taken is None:
