@@ -18,6 +18,7 @@ COMMANDS = {
     "train": "train.TrainFlags",
     "evaluate": "evaluate.EvaluateFlags",
     "live": "live.LiveFlags",
+    "feet": "feet.FootChoice",
     "export": "export.ExportFlags",
     "datasets": "datasets.DatasetsFlags",
     "examples": "examples.ExamplesFlags",

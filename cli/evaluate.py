@@ -18,7 +18,7 @@ from springfoot.studies.base.flags import SettingsFlags, given
 
 LONGEST_NAME = 60
 """Most letters of the policies' names in the name of a folder; chosen."""
-MOST_IN_REPORT = 6
+MOST_IN_REPORT = 8
 """Policies that the colours and dashes of a report tell apart."""
 
 
@@ -26,7 +26,7 @@ MOST_IN_REPORT = 6
 class EvaluateFlags:
     """How human is the walk? Runs a policy, prints its gait beside people's, writes numbers, pictures and a report.
 
-    Of several policies each gets a folder of its own, and one report shows them, up to six, side by side.
+    Of several policies each gets a folder of its own, and one report shows them, up to eight, side by side.
 
     A fall is a result: the exit code is 0 with falls, 2 for bad input.
     """

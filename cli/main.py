@@ -1,9 +1,7 @@
 """Define the command `springfoot`: the code of `train.py` and `evaluate.py`, and every study by its name."""
 
-import shlex
 import sys
 from collections.abc import Sequence
-from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -26,13 +24,14 @@ FIRST = """To begin with:
 
 springfoot --help lists all commands."""
 """Commands that a newcomer types, in their order."""
-COMMANDS = ("train", "evaluate", "live", "export", "study", "datasets", "examples", "completion")
+COMMANDS = ("train", "evaluate", "live", "feet", "export", "study", "datasets", "examples", "completion")
 """Names of all commands."""
 HELP = f"""usage: springfoot {{{",".join(COMMANDS)}}} ...
 
   springfoot train --out FOLDER     train a policy that sets the stiffness of ankles and toes
   springfoot evaluate POLICY        how human is its walk? numbers, curves, pictures; POLICY may be pretrained
   springfoot live POLICY            walk it in a browser, its stiffness, speed, slope, body and feet under sliders
+  springfoot feet                   which spring or foot takes a person least? such as --spring 0 2 4 6
   springfoot export POLICY          write it as an ONNX file, which runs without springfoot
   springfoot study NAME             hold many walks against each other; springfoot study --help lists them
   springfoot datasets               write Minari sets of walks, for offline learning
@@ -100,6 +99,10 @@ def _run(words: list[str]) -> int:
                 from .live import live_main
 
                 return live_main(rest)
+            case ["feet", *rest]:
+                from .feet import feet_main
+
+                return feet_main(rest)
             case ["export", *rest]:
                 from .export import export_main
 
@@ -154,21 +157,9 @@ def study_main(arguments: Sequence[str]) -> int:
         known = f"there are {', '.join(STUDIES)}{perhaps(name, STUDIES)}"
         print(f"springfoot study: error: no study {name!r:.60}; {known}", file=sys.stderr)
         return 2
-    from springfoot.command_line import end_in_order, exit_code, parse
+    from .study import run_study
 
-    program = f"springfoot study {name}"
-    study = parse(study_class(name), words, program)
-    study = replace(study, command=shlex.join([*program.split(), *words]))
-
-    def run() -> int:
-        """Run the study, which signals end in good order; return the exit code."""
-        from springfoot.compiling import tell_of_compiling
-
-        end_in_order()
-        tell_of_compiling()
-        return study.run(name)
-
-    return exit_code(program, run)
+    return run_study(study_class(name), name, words, f"springfoot study {name}")
 
 
 def study_class(name: str) -> "type[Study]":

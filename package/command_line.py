@@ -7,7 +7,7 @@ import signal
 import sys
 import threading
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from contextlib import redirect_stderr
 from difflib import SequenceMatcher
 from typing import Any, TypeVar
@@ -33,11 +33,14 @@ _REWORDED = {
 """tyro's wording -> ours."""
 
 
-def parse(flags: type[Flags], words: Sequence[str] | None, program: str) -> Flags:
+def parse(
+    flags: type[Flags], words: Sequence[str] | None, program: str, repeatable: Collection[str] = frozenset()
+) -> Flags:
     """Return the flags of a command line as the dataclass `flags`; `--help` exits with 0.
 
     The command line is `words`, or with None that of the process. `program` is the command's name in messages. A bad
-    flag, and one that is given twice, exits with 2 after one line on standard error that names the flag and its fault.
+    flag, and one that is given twice unless it is `repeatable`, exits with 2 after one line on standard error that
+    names the flag and its fault.
     """
     words = list(sys.argv[1:] if words is None else words)
     output = io.StringIO()
@@ -48,17 +51,18 @@ def parse(flags: type[Flags], words: Sequence[str] | None, program: str) -> Flag
         if end.code == 2:
             print(f"{program}: error: {_one_line(_message_in_box(output.getvalue()))}", file=sys.stderr)
         raise
-    if repeated := _repeated_flag(words):
+    if repeated := _repeated_flag(words, repeatable):
         print(f"{program}: error: {repeated} is given twice; give it once", file=sys.stderr)
         raise SystemExit(2)
     return parsed
 
 
-def _repeated_flag(words: Sequence[str]) -> str:
-    """Return the first flag that stands twice among the words, "" if none does; tyro would take the last silently."""
+def _repeated_flag(words: Sequence[str], repeatable: Collection[str]) -> str:
+    """Return the first flag that stands twice among the words and may not, "" if none does; tyro would take the last
+    silently."""
     # --name=value and --name, with - or _ for the parts of the name.
     flags = [word.partition("=")[0].replace("_", "-") for word in words if word.startswith("--")]
-    return next((flag for flag, count in Counter(flags).items() if count > 1), "")
+    return next((flag for flag, count in Counter(flags).items() if count > 1 and flag not in repeatable), "")
 
 
 def _message_in_box(text: str) -> str:

@@ -6,7 +6,7 @@ from springfoot.lazy import lazy_names
 
 if TYPE_CHECKING:
     from .criteria import HUMAN_LIKE, NO_FALLS, WALKS, Criterion, number_text, unmet, with_derived
-    from .effort import mean_effort, stiffness_charge
+    from .effort import effort_numbers, mean_effort, stiffness_charge
     from .metrics import MOMENT_CURVES, Gait, measure
     from .per_leg import asymmetry, leg_numbers
     from .series import foot_contacts, strides_within
@@ -22,6 +22,7 @@ __all__ = [
     "StrideTally",
     "add_episode",
     "asymmetry",
+    "effort_numbers",
     "foot_contacts",
     "leg_numbers",
     "mean_effort",
@@ -48,6 +49,7 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
             "asymmetry": "per_leg",
             "foot_contacts": "series",
             "leg_numbers": "per_leg",
+            "effort_numbers": "effort",
             "mean_effort": "effort",
             "measure": "metrics",
             "number_text": "criteria",

@@ -1,5 +1,5 @@
-const COLOURS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9"]; // Okabe and Ito: told apart by the colour-blind
-const DASHES = ["", "6 3", "2 2", "8 2 2 2", "10 4", "4 1"];
+const COLOURS = ["#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7A3DB8", "#8A5A00"]; // Okabe and Ito: told apart by the colour-blind; and two more
+const DASHES = ["", "6 3", "2 2", "8 2 2 2", "10 4", "4 1", "8 2 2 2 2 2", "2 5"];
 const SVG = "http://www.w3.org/2000/svg";
 const colour = i => COLOURS[i % COLOURS.length], dash = i => DASHES[i % DASHES.length];
 

@@ -67,7 +67,7 @@ def _origin_text(walks: Sequence[tuple[Recording, Gait]], command: str) -> str:
     return "\n".join([*lines, *settings])
 
 
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7A3DB8", "#8A5A00")
 """Colours of the policies, in their order; as in page.html."""
 
 

@@ -15,7 +15,7 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 import tyro
 
 from springfoot.envs.settings import CONDITION_SETTINGS, FOOT_SETTINGS, THEME_OF, THEMES, BipedSettings
-from springfoot.errors import quoted
+from springfoot.errors import SpringfootError, quoted
 from springfoot.files.json_file import json_fault, keys_once, read_array, read_object
 from springfoot.gait.people import read_gait
 from springfoot.gait.springs import StiffnessSchedule, read_foot
@@ -95,6 +95,19 @@ def foot_given(value: str | dict[str, Any]) -> str | dict[str, Any]:
     if isinstance(value, str) and (Path(value).is_file() or Path(value).suffix):
         return read_foot(value)
     return value
+
+
+def read_foot_flag(words: str) -> str | dict[str, Any]:
+    """Return the foot setting of a flag's value: a kind's word, JSON text, or a file's name.
+
+    Raises `SpringfootError` for text that is no JSON, and for a file that cannot be read.
+    """
+    try:
+        return foot_given(_read_word_or_json([words]))
+    except SpringfootError:
+        raise  # it is a ValueError too
+    except ValueError as error:
+        raise SpringfootError(f"a foot {error}") from None
 
 
 LIST_FLAGS = ("drawn_feet", "drawn_bodies")

@@ -6,7 +6,7 @@ episodes) gives the flags, their defaults and their `QUICK` values, and answers 
 """
 
 import shlex
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
@@ -43,7 +43,7 @@ class Study:
 
     quick: tyro.conf.FlagCreatePairsOff[bool] = False
     """See that it runs, in a minute at most: tiny counts in place of what is flagged; its figures then mean nothing."""
-    out: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER", help_behavior_hint="(default: runs/STUDY-N)")] = None
+    out: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER", help_behavior_hint="(default: runs/NAME-N)")] = None
     """New folder for its CSV files and pictures."""
     command: tyro.conf.Suppress[tyro.conf.Fixed[str]] = ""
     """The command line that runs it; its report names it."""
@@ -52,6 +52,8 @@ class Study:
     """Name of a flag -> its value with `--quick`."""
     UNIT: ClassVar[str] = "s"
     """Unit of its progress."""
+    REPEATABLE: ClassVar[Collection[str]] = frozenset()
+    """Flags that may be given more than once."""
 
     def check(self) -> None:
         """Raise `SpringfootError` for a bad flag; called before anything else."""

@@ -2,25 +2,30 @@
 
 from typing import Any
 
-from springfoot.evaluation.numbers import Gait, asymmetry, leg_numbers
+from springfoot.envs.physics import SIDES
+from springfoot.evaluation.numbers import MOMENT_CURVES, Gait, asymmetry, leg_numbers
 
 FOOT_NUMBERS = (
     *("falls", "speed_m_s", "push_off_J_kg", "sound_peak_bw", "step_asymmetry", "hip_work_J_kg_m", "fibre_J_kg_m"),
-    *("effort", "ankle_range_deg", "toe_range_deg", "clearance_m"),
+    *("effort", "ankle_range_deg", "toe_range_deg", "clearance_m", "hip_moment_Nm_kg", "knee_moment_Nm_kg"),
 )
 """Names of the numbers. They are part of the question of kept results, so that a new number has all walks measured
 again."""
 
 
-def numbers_of(gait: Gait) -> dict[str, float | None]:
+def numbers_of(gait: Gait, examined_side: str = "right") -> dict[str, float | None]:
     """Return the numbers of an undisturbed walk, by `FOOT_NUMBERS`; None for numbers without a stride.
 
-    The left foot is the sound one, the right one is examined.
+    The foot of `examined_side` is examined, the other one is sound. Where both feet are alike, "both", it is the right
+    one. Moments are peaks in extension of the sound side.
     """
     metrics = gait.metrics
     tally = gait.tally
-    sound, examined = leg_numbers(tally).values()
-    step_asymmetry = asymmetry({"left": sound, "right": examined})["step_length"]
+    sides = ("right", "left") if examined_side == "left" else ("left", "right")
+    legs = leg_numbers(tally)
+    sound, examined = (legs[side] for side in sides)
+    sound_curves = tally.feet[SIDES.index(sides[0])]
+    step_asymmetry = asymmetry(legs)["step_length"]
     step_length = metrics["step_length_m"]
     numbers: dict[str, float | None] = {
         "falls": metrics["falls"] / metrics["episodes"],
@@ -34,6 +39,12 @@ def numbers_of(gait: Gait) -> dict[str, float | None]:
         "ankle_range_deg": examined["joint_range_deg"]["ankle"],
         "toe_range_deg": examined["joint_range_deg"]["toe"],
         "clearance_m": examined["toe_clearance_m"],
+        **{
+            f"{joint}_moment_Nm_kg": float(sound_curves.mean(MOMENT_CURVES[joint]).max())
+            if sound_curves.count
+            else None
+            for joint in ("hip", "knee")
+        },
     }
     hip_work = _sum(leg["joint_work_J_kg"]["hip"]["positive"] for leg in (sound, examined))
     if hip_work is not None and step_length:

@@ -36,6 +36,12 @@ class Orthosis(SpringMap):
 
     def feet_of(self, case: float, spring: float) -> Mapping[str, Any]:
         """Return two weak calves (sound ones for 1) with an orthosis each, at rest at 0°."""
-        calf = {"kind": "intact"} if case == 1.0 else {"kind": "weak", "strength": case}
-        foot = calf | {"orthosis": {"ankle_stiffness": round(spring * PER_DEG, 3), "ankle_deg": 0.0}}
+        foot = braced_calf(case, spring)
         return {"left_foot": foot, "right_foot": foot}
+
+
+def braced_calf(strength: float, spring: float, rest_deg: float = 0.0) -> dict[str, Any]:
+    """Return the foot below a calf of a share `strength` of a sound one's, in an orthosis of stiffness `spring`
+    [N m/deg] at rest at `rest_deg`."""
+    calf = {"kind": "intact"} if strength == 1.0 else {"kind": "weak", "strength": strength}
+    return calf | {"orthosis": {"ankle_stiffness": round(spring * PER_DEG, 3), "ankle_deg": rest_deg}}

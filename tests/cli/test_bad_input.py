@@ -214,7 +214,7 @@ COMMANDS = [
     (["evaluate", "schedule", "--seed", str(10**20)], 'springfoot evaluate: error: seed must be a whole number >= 0 and <= 1000000000000, got 100000000000000000000'),
     (["evaluate", "schedule", "--seconds", "1e308"], 'springfoot evaluate: error: episode_seconds must be a finite number >= 0 and <= 1e+09 s, got 1e+308'),
     (["evaluate", "schedule", "--seconds", "1e6"], 'springfoot evaluate: error: a recording must be of at most 100,000 s in all, got 20 episodes of 1e+06 s'),
-    (["evaluate", *["schedule"] * 7], 'springfoot evaluate: error: report.html shows up to 6 policies, got 7; give --no-report'),
+    (["evaluate", *["schedule"] * 9], 'springfoot evaluate: error: report.html shows up to 8 policies, got 9; give --no-report'),
     (["evaluate", "schedule", "--height", "1e308"], 'springfoot evaluate: error: height must be in [1, 2.3] m, got 1e+308'),
     (["evaluate", "x\x1b[31m"], "springfoot evaluate: error: no policy 'x\\x1b[31m': give a .safetensors or .onnx file, a run folder, a schedule in a .csv or .json file, module:function, frozen:POLICY, or one of pretrained, medium, predicted, learned, untrained, random, constant, schedule, quasi_stiffness, thesis, thesis_printed"),
     (["evaluate", "schedule", "--human", "a\x1b[31m.csv"], 'springfoot evaluate: error: no file a\\x1b[31m.csv'),

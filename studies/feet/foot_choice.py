@@ -1,0 +1,284 @@
+"""Walk learned persons on feet of the user's choice, and tell which foot takes least.
+
+    springfoot feet --height 1.80 --mass 80 --speed 1.1 --calf 0.25 --spring 0 2 4 6 9 12
+    springfoot feet --side right --foot intact --foot rigid --foot my_foot.csv
+
+All persons walk the same episodes on all feet, undisturbed at two commanded speeds, and pushed.
+"""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal
+
+import matplotlib
+import numpy as np
+import tyro
+from matplotlib.figure import Figure
+
+from springfoot.agents.policies import PolicyFunction
+from springfoot.arrays import NDArray
+from springfoot.envs import BipedSettings
+from springfoot.envs.settings import body_of, settings_from
+from springfoot.errors import SpringfootError, require_number
+from springfoot.evaluation.numbers import Gait, effort_numbers, measure
+from springfoot.evaluation.page import foot_words, write_page
+from springfoot.evaluation.recording import Recording, policy_and_settings, record_feet
+from springfoot.evaluation.report import STYLE
+from springfoot.files.markdown import MISSING, table, text_of
+
+from ..base.flags import read_foot_flag
+from ..base.study import Answer, OnProgress, WalkingStudy
+from .foot_numbers import numbers_of
+from .orthosis import braced_calf
+from .told_apart import GAP, difference, price_at, verdict
+from .walked_speeds import TWO_PRICES, Row, rows_csv
+
+MOST_FEET = 8
+"""Feet that the colours of a report tell apart."""
+SIDES_OF = {"left": ("left_foot",), "right": ("right_foot",), "both": ("left_foot", "right_foot")}
+"""Side -> settings of its feet."""
+OTHER_SPEED = 0.1
+"""Difference of the second commanded speed, as a share."""
+FAST = 1.4
+"""Speed from which on the second commanded speed is the slower one; persons have learned up to 1.6 [m/s]."""
+PRICES = dict(zip(TWO_PRICES, ("fibre work", "effort"), strict=True))
+"""Column of a price -> its name."""
+LIMITS = """- It is a body in a plane: nothing here is about comfort, pain, or balance to the side.
+- The person has adapted to all feet at once; one who wears a single foot for weeks may walk cheaper on it.
+- Read differences, not the price itself. A missing ankle comes out cheaper here than a sound one; people pay more."""
+"""What the model cannot say."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Walk:
+    """A person's walk on a foot."""
+
+    recording: Recording
+    gait: Gait
+
+    def prices(self, price: str) -> list[float]:
+        """Return a price of each episode."""
+        key = {"fibre_J_kg_m": "fibre_J_kg_m", "effort": "total"}[price]
+        body = body_of(self.recording.settings)
+        return [effort_numbers([episode], body)[key] for episode in self.gait.tally.effort]
+
+
+@dataclass(frozen=True, kw_only=True)
+class FootChoice(WalkingStudy):
+    """Which foot for this person? Walks learned persons on every foot, and tells which takes least.
+
+    Give springs of an orthosis (--spring), or two to eight feet (--foot). The first is that to compare with.
+    """
+
+    height: float = 1.7
+    """Height of the body [m]."""
+    mass: float = 63.0
+    """Mass of the body [kg]."""
+    speed: float = 1.2
+    """Speed that is asked for [m/s]."""
+    side: Literal["left", "right", "both"] = "both"
+    """Side on which the springs or feet are worn; the other foot is sound."""
+    calf: float | None = None
+    """Strength of the calf beside the springs, as a share of a sound one's, which is 0.10 x body weight x height;
+    0.1 to 0.6, None for a sound calf."""
+    spring: tuple[float, ...] = ()
+    """Stiffness of orthoses at the ankle, at rest at --rest-deg [N m/deg]; 0 is a slack one."""
+    rest_deg: float = 0.0
+    """Rest angle of the orthoses, dorsiflexion positive [deg]."""
+    foot: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="FOOT")] = ()
+    """A foot, as of --right-foot: a kind, JSON, or a file; once for each foot."""
+    persons: Annotated[tuple[str, ...], tyro.conf.arg(metavar="PERSON ...")] = ("learned",)
+    """Persons that adapt to the feet: run folders, files, or `learned`."""
+    push_newton: float = 100.0
+    """Size of the pushes in the pushed walks [N]."""
+    episodes: int = 5
+    """Episodes of each person on each foot, undisturbed, and as many pushed."""
+    seconds: float = 12.0
+    """Length of each episode."""
+
+    QUICK: ClassVar[Mapping[str, Any]] = {"episodes": 1, "seconds": 6.0}
+    REPEATABLE: ClassVar[Collection[str]] = frozenset({"--foot"})
+
+    def check(self) -> None:
+        """Refuse feet that are missing, too many or alike, and numbers out of range."""
+        super().check()
+        require_number("push_newton", self.push_newton, 0.0, unit="N")
+        if bool(self.spring) == bool(self.foot):
+            raise SpringfootError(
+                "give either --spring or --foot, such as --spring 0 2 4 6 or --foot intact --foot rigid"
+            )
+        if self.foot and (self.calf is not None or self.rest_deg):
+            raise SpringfootError("--calf and --rest-deg go with --spring; a foot of --foot has numbers of its own")
+        count = len(self.feet)
+        if not 2 <= count <= MOST_FEET:
+            raise SpringfootError(f"give 2 to {MOST_FEET} different springs or feet, got {count}")
+
+    @property
+    def feet(self) -> dict[str, Any]:
+        """Return name -> setting of each foot."""
+        if self.spring:
+            return {f"{k:g} N·m/deg": braced_calf(self.calf or 1.0, k, self.rest_deg) for k in self.spring}
+        named = {}
+        for words in self.foot:
+            foot = read_foot_flag(words)
+            name = Path(words).stem if Path(words).suffix else foot_words(settings_from(left_foot=foot).left_foot)
+            named[name] = foot
+        return named
+
+    @property
+    def total(self) -> float:
+        """Return the simulated time of all walks if none falls [s]."""
+        return 3 * len(self.persons) * len(self.feet) * self.episodes * self.seconds
+
+    def ask(self, progress: OnProgress) -> Answer:
+        """Walk on every foot."""
+        names = list(self.feet)
+        persons = [self._person(name) for name in self.persons]
+        walks, faster, pushed = (
+            [self._walk(*person, progress, **changed) for person in persons]
+            for changed in ({}, {"speed": self._other_speed}, {"push_newton": self.push_newton})
+        )
+        rows = []
+        for person, own, own_pushed in zip(self.persons, walks, pushed, strict=True):
+            for name, walk, pushed_walk in zip(names, own, own_pushed, strict=True):
+                falls = {"falls_pushed": float((pushed_walk.recording.fall_reason != "").mean())}
+                rows.append({"person": person, "foot": name, **numbers_of(walk.gait, self.side), **falls})
+        prices = {
+            price: [
+                self._prices(price, [[of[index] for of in at] for at in (walks, faster)]) for index in range(len(names))
+            ]
+            for price in TWO_PRICES
+        }
+        shown = [(walk.recording, walk.gait) for walk in walks[0]]
+        files = {
+            "feet.csv": rows_csv(rows),
+            "feet.png": partial(self._draw, names=names, prices=prices),
+            "report.html": partial(write_page, walks=shown, command=self.command),
+        }
+        return Answer(text=self._text(names, rows, prices), files=files)
+
+    @property
+    def _other_speed(self) -> float:
+        """Return the second commanded speed [m/s]: faster, but for fast walks slower."""
+        return self.speed * (1.0 + OTHER_SPEED if self.speed < FAST else 1.0 - OTHER_SPEED)
+
+    def _person(self, name: str) -> tuple[PolicyFunction, BipedSettings]:
+        """Return a person by name, and the settings to walk it with."""
+        given = {"height": self.height, "mass": self.mass, "speed": self.speed, "episode_seconds": self.seconds}
+        act, settings = policy_and_settings(name, given)
+        if settings.acts == "stiffness":
+            raise SpringfootError(f"{name} moves no person: it was trained with acts 'stiffness'")
+        return act, settings
+
+    def _walk(
+        self, act: PolicyFunction, settings: BipedSettings, progress: OnProgress, **changed: float
+    ) -> list["_Walk"]:
+        """Return a person's walks on all feet, each named by its foot, with the `changed` settings."""
+        feet = [dict.fromkeys(SIDES_OF[self.side], foot) for foot in self.feet.values()]
+        settings = replace(settings, **changed)
+        recordings = record_feet(act, settings, feet, name="person", progress=progress, **self.how)
+        named = [replace(recording, policy=name) for recording, name in zip(recordings, self.feet, strict=True)]
+        return [_Walk(recording=recording, gait=measure(recording)) for recording in named]
+
+    def _prices(self, price: str, walks: Sequence[Sequence["_Walk"]]) -> NDArray | None:
+        """Return a price (P, E) of each person and episode at the walked speed `self.speed`.
+
+        `walks` are two walks of each person on one foot, at two commanded speeds. None if somebody fell, or cannot
+        change speed.
+        """
+        if any((walk.recording.fall_reason != "").any() for at_speed in walks for walk in at_speed):
+            return None
+        prices = np.array([[walk.prices(price) for walk in at_speed] for at_speed in walks])
+        walked = np.array([[walk.gait.tally.speed for walk in at_speed] for at_speed in walks])
+        return price_at(self.speed, walked, prices)
+
+    def _text(self, names: Sequence[str], rows: Sequence[Row], prices: Mapping[str, Sequence[NDArray | None]]) -> str:
+        """Return the report."""
+        verdicts = [verdict(words, names, prices[price]) for price, words in PRICES.items()]
+        lines = []
+        for index, name in enumerate(names):
+            here = [row for row in rows if row["foot"] == name]
+            fibre = prices[TWO_PRICES[0]][index]
+            lines.append(
+                [
+                    name,
+                    f"{_share(here, 'falls')} / {_share(here, 'falls_pushed')}",
+                    _mean(here, "speed_m_s", ".2f"),
+                    text_of(None if fibre is None else float(fibre.mean()), ".2f"),
+                    *(_change(of_price[index], of_price[0]) if index else MISSING for of_price in prices.values()),
+                    *(_mean(here, key, pattern) for key, pattern in _COLUMNS.values()),
+                ]
+            )
+        head = ["foot", "falls / pushed", "walked, m/s", "fibre work, J/kg/m", "change", "effort, change", *_COLUMNS]
+        return "\n\n".join(
+            [
+                f"**{verdicts[0]}** {verdicts[1]}",
+                table(head, lines),
+                self._how(names[0]),
+                f"What this cannot say:\n\n{LIMITS}",
+                "![Price of the walk on each foot](feet.png)",
+            ]
+        )
+
+    def _how(self, first: str) -> str:
+        """Return the paragraph on how the table was made; changes are against the foot `first`."""
+        calf = "" if self.calf is None else f", calves of {self.calf:.0%}"
+        worn = "both feet" if self.side == "both" else f"the {self.side} foot"
+        alone = " Of one person, they know nothing of how others learn." if len(self.persons) == 1 else ""
+        return (
+            f"{self.height:g} m, {self.mass:g} kg{calf}, on {worn}, asked for {self.speed:g} m/s. "
+            f"Persons: {', '.join(self.persons)}. Each walks on each foot {self.what_ran}, as much at "
+            f"{self._other_speed:.3g} m/s, and as much pushed by ±{self.push_newton:g} N. Prices are at "
+            f"{self.speed:g} m/s walked. Changes are against {first}; their 95 % intervals are over persons and "
+            f"episodes.{alone} Feet less than {GAP:.0%} apart are not told apart. Push-off, of ankle and toe, is of "
+            "the side that wears the foot; peak force and moments are of the other side, the left one if both wear it."
+        )
+
+    def _draw(self, path: Path, names: Sequence[str], prices: Mapping[str, Sequence[NDArray | None]]) -> None:
+        """Draw both prices of every foot: a pale line for each person, and the mean with its spread over the walks."""
+        with matplotlib.rc_context(STYLE):
+            figure = Figure(figsize=(9.0, 3.6), layout="constrained")
+            places = np.array(self.spring) if self.spring else np.arange(len(names))
+            for ax, (price, words) in zip(figure.subplots(1, len(PRICES)), PRICES.items(), strict=True):
+                walked = [(x, values) for x, values in zip(places, prices[price], strict=True) if values is not None]
+                if walked:
+                    x = [place for place, _ in walked]
+                    by_person = np.array([values.mean(1) for _, values in walked]).T
+                    for values in by_person:
+                        ax.plot(x, values, "-", color="#0b6e8f", lw=0.8, alpha=0.4)
+                    ax.plot(x, by_person.mean(0), "o-", color="#0b6e8f", ms=4, lw=1.6)
+                ax.set_title(f"{words}, {'J/kg/m' if price == TWO_PRICES[0] else 'dimensionless'}")
+                if self.spring:
+                    ax.set_xlabel("spring (N·m/deg)")
+                else:
+                    ax.set_xticks(places, names, rotation=20, ha="right")
+                ax.grid(color="#ededed", lw=0.6)
+            figure.savefig(path, dpi=110, facecolor="white", metadata={"Software": "springfoot"})
+
+
+_COLUMNS = {
+    "push-off, J/kg": ("push_off_J_kg", ".2f"),
+    "peak, BW": ("sound_peak_bw", ".2f"),
+    "hip, N·m/kg": ("hip_moment_Nm_kg", ".2f"),
+    "knee, N·m/kg": ("knee_moment_Nm_kg", ".2f"),
+    "step asymmetry": ("step_asymmetry", ".0%"),
+}
+"""Heading -> column and format of the numbers that are told without an interval."""
+
+
+def _change(prices: NDArray | None, first: NDArray | None) -> str:
+    """Return the difference of prices from those of the first foot in words."""
+    return MISSING if prices is None or first is None else difference(prices, first).text
+
+
+def _mean(rows: Sequence[Row], key: str, pattern: str) -> str:
+    """Return the mean of a number over persons, in words."""
+    values = [row[key] for row in rows]
+    return text_of(None if None in values else float(np.mean(values)), pattern)
+
+
+def _share(rows: Sequence[Row], key: str) -> str:
+    """Return a share of the episodes of all persons in percent."""
+    return f"{float(np.mean([row[key] for row in rows])):.0%}"

@@ -1,0 +1,64 @@
+"""The command `springfoot feet`: the numbers of `study orthosis` on the same feet, its page, its refusals."""
+
+import csv
+
+import pytest
+
+from springfoot.cli.main import main
+
+QUICK = ["feet", "--quick", "--threads", "1"]
+
+
+def read(path) -> list[dict[str, str]]:
+    """Return the rows of a CSV file."""
+    with path.open(encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+@pytest.mark.slow
+def test_springs_have_the_numbers_of_the_study_of_orthoses(tmp_path, capsys):
+    words = ["--calf", "0.2", "--speed", "1.0", "--spring", "0", "3.6", "8.7"]
+    assert main([*QUICK, *words, "--out", str(tmp_path / "feet")]) == 0
+    text = capsys.readouterr().out
+    study = ["study", "orthosis", "learned", "--quick", "--threads", "1", "--beside", "None"]
+    assert main([*study, "--out", str(tmp_path / "study")]) == 0
+    feet = {row["foot"]: row for row in read(tmp_path / "feet" / "feet.csv")}
+    study_rows = [row for row in read(tmp_path / "study" / "walks.csv") if float(row["speed_m_s"]) == 1.0]
+    for spring in ("0", "3.6", "8.7"):
+        (expected,) = (row for row in study_rows if float(row["spring"]) == float(spring))
+        own = feet[f"{spring} N·m/deg"]
+        assert own["speed_m_s"] == expected["walked_m_s"]
+        for name in ("falls", "fibre_J_kg_m", "effort", "push_off_J_kg", "sound_peak_bw", "knee_moment_Nm_kg"):
+            assert own[name] == expected[name]
+    assert "What this cannot say" in text and "95 % intervals" in text
+    page = (tmp_path / "feet" / "report.html").read_text(encoding="utf-8")
+    assert all(page.count(name) > 1 for name in feet)  # a tab for each foot
+    assert (tmp_path / "feet" / "feet.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("words", "error"),
+    [
+        ([], "give either --spring or --foot, such as --spring 0 2 4 6 or --foot intact --foot rigid"),
+        (["--spring", "0", "2", "--foot", "rigid"], "give either --spring or --foot, such as"),
+        (["--spring", "2"], "give 2 to 8 different springs or feet, got 1"),
+        (["--foot", "rigid", "--foot", "rigid"], "give 2 to 8 different springs or feet, got 1"),
+        (["--spring", *map(str, range(9))], "give 2 to 8 different springs or feet, got 9"),
+        (["--foot", "rigid", "--foot", "intact", "--calf", "0.3"], "--calf and --rest-deg go with --spring"),
+        (["--foot", "rigid", "--foot", "ridig"], "ridig"),
+        (["--foot", "rigid", "--foot", "{"], "must be JSON"),
+        (["--foot", "rigid", "--foot", "none.csv"], "none.csv"),
+        (["--spring", "0", "2", "--calf", "2"], "strength"),
+        (["--spring", "0", "2", "--persons", "pretrained"], "pretrained moves no person"),
+        (["--spring", "0", "2", "--spring", "4"], "--spring is given twice"),
+    ],
+)
+def test_bad_input_is_one_line(words, error, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    try:
+        code = main(["feet", *words])
+    except SystemExit as end:
+        code = end.code
+    told = capsys.readouterr().err
+    assert code == 2 and error in told and told.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
