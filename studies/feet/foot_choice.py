@@ -43,9 +43,9 @@ OTHER_SPEED = 0.1
 """Difference of the second commanded speed, as a share."""
 FAST = 1.4
 """Speed from which on the second commanded speed is the slower one; persons have learned up to 1.6 [m/s]."""
-PRICES = dict(zip(TWO_PRICES, ("fibre work", "effort"), strict=True))
+PRICE_NAMES = dict(zip(TWO_PRICES, ("fibre work", "effort"), strict=True))
 """Column of a price -> its name."""
-LIMITS = """- It is a body in a plane: nothing here is about comfort, pain, or balance to the side.
+CANNOT_SAY = """- It is a body in a plane: nothing here is about comfort, pain, or balance to the side.
 - The person has adapted to all feet at once; one who wears a single foot for weeks may walk cheaper on it.
 - Read differences, not the price itself. A missing ankle comes out cheaper here than a sound one; people pay more."""
 """What the model cannot say."""
@@ -196,7 +196,7 @@ class FootChoice(WalkingStudy):
 
     def _text(self, names: Sequence[str], rows: Sequence[Row], prices: Mapping[str, Sequence[NDArray | None]]) -> str:
         """Return the report."""
-        verdicts = [verdict(words, names, prices[price]) for price, words in PRICES.items()]
+        verdicts = [verdict(words, names, prices[price]) for price, words in PRICE_NAMES.items()]
         lines = []
         for index, name in enumerate(names):
             here = [row for row in rows if row["foot"] == name]
@@ -217,7 +217,7 @@ class FootChoice(WalkingStudy):
                 f"**{verdicts[0]}** {verdicts[1]}",
                 table(head, lines),
                 self._how(names[0]),
-                f"What this cannot say:\n\n{LIMITS}",
+                f"What this cannot say:\n\n{CANNOT_SAY}",
                 "![Price of the walk on each foot](feet.png)",
             ]
         )
@@ -241,7 +241,7 @@ class FootChoice(WalkingStudy):
         with matplotlib.rc_context(STYLE):
             figure = Figure(figsize=(9.0, 3.6), layout="constrained")
             places = np.array(self.spring) if self.spring else np.arange(len(names))
-            for ax, (price, words) in zip(figure.subplots(1, len(PRICES)), PRICES.items(), strict=True):
+            for ax, (price, words) in zip(figure.subplots(1, len(PRICE_NAMES)), PRICE_NAMES.items(), strict=True):
                 walked = [(x, values) for x, values in zip(places, prices[price], strict=True) if values is not None]
                 if walked:
                     x = [place for place, _ in walked]
