@@ -237,7 +237,7 @@ class FootChoice(WalkingStudy):
         )
 
     def _draw(self, path: Path, names: Sequence[str], prices: Mapping[str, Sequence[NDArray | None]]) -> None:
-        """Draw both prices of every foot: a pale line for each person, and the mean with its spread over the walks."""
+        """Draw both prices of every foot: pale for each person, and their mean."""
         with matplotlib.rc_context(STYLE):
             figure = Figure(figsize=(9.0, 3.6), layout="constrained")
             places = np.array(self.spring) if self.spring else np.arange(len(names))
@@ -246,9 +246,10 @@ class FootChoice(WalkingStudy):
                 if walked:
                     x = [place for place, _ in walked]
                     by_person = np.array([values.mean(1) for _, values in walked]).T
+                    line = "-" if self.spring else "none"  # feet are in no order
                     for values in by_person:
-                        ax.plot(x, values, "-", color="#0b6e8f", lw=0.8, alpha=0.4)
-                    ax.plot(x, by_person.mean(0), "o-", color="#0b6e8f", ms=4, lw=1.6)
+                        ax.plot(x, values, "o", ls=line, color="#0b6e8f", ms=3, lw=0.8, alpha=0.4)
+                    ax.plot(x, by_person.mean(0), "o", ls=line, color="#0b6e8f", ms=5, lw=1.6)
                 ax.set_title(f"{words}, {'J/kg/m' if price == TWO_PRICES[0] else 'dimensionless'}")
                 if self.spring:
                     ax.set_xlabel("spring (N·m/deg)")
