@@ -127,6 +127,11 @@ def test_the_version_stands_once(metadata, capsys):
     assert f"\n  version: {springfoot.__version__}\n" in RECIPE
 
 
+def test_the_package_runs_as_the_command():
+    done = subprocess.run([sys.executable, "-m", "springfoot", "--version"], capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (0, f"springfoot {springfoot.__version__}\n")
+
+
 def test_the_conda_recipe_needs_what_the_wheel_needs():
     theirs = {"matplotlib": "matplotlib-base", "mujoco": "mujoco-python"}
     project = PROJECT["project"]
