@@ -32,11 +32,11 @@ def quoted(value: object, most: int = 60) -> str:
     return text if len(text) <= most else f"{text[: most - 3]}..."
 
 
-def perhaps(word: str, known: Iterable[str]) -> str:
-    """Return the end of a message on an unknown `word`, "; perhaps NAME?" with the most similar of the `known` names;
-    "" if none is similar."""
+def perhaps(word: str, known: Iterable[str], before: str = "") -> str:
+    """Return the end of a message on an unknown `word`, "; perhaps NAME?" with the most similar of the `known` names
+    and the text `before` it; "" if none is similar."""
     similar = get_close_matches(word, known, n=1)
-    return f"; perhaps {similar[0]}?" if similar else ""
+    return f"; perhaps {before}{similar[0]}?" if similar else ""
 
 
 def as_float(value: object) -> float:

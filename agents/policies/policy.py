@@ -4,6 +4,8 @@ The file's header has one entry, `springfoot`, JSON that describes the tensors a
 file does not tell where or when it was made. `Policy` needs NumPy only, so a policy runs without a learner.
 """
 
+from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib import resources
 from itertools import pairwise
@@ -55,6 +57,8 @@ SHIPPED = {
 """Name of a policy of this package -> its file; `policy_card` describes each."""
 PRETRAINED_BY = "python train.py --push-newton 250 --timesteps 14000000 --out runs/pretrained"
 """Command that made `pretrained` from nothing."""
+POLICY_SUFFIXES = (".safetensors", ".onnx")
+"""Ends of the names of policies' files."""
 RUN = "run.json"
 """Name of a run folder's record: configuration, evaluations, status."""
 
@@ -177,9 +181,20 @@ def find_policy(name: str | Path) -> Path:
     elif not path.is_file():
         raise SpringfootError(
             f"no policy {name}: give a .safetensors or .onnx file, a run folder, module:function or 'pretrained'"
-            f"{perhaps(str(name), SHIPPED)}"
+            f"{perhaps_policy(str(name), SHIPPED)}"
         )
     return path
+
+
+def perhaps_policy(name: str, known: Iterable[str]) -> str:
+    """Return the end of a message on a policy `name` that is not there: the most similar of the `known` names, or of
+    the folders and policy files beside that path; "" if none is similar."""
+    path = Path(name)
+    beside: list[str] = []
+    with suppress(OSError):
+        beside = [other.name for other in path.parent.iterdir() if other.is_dir() or other.suffix in POLICY_SUFFIXES]
+    folder = "" if path.parent == Path() else f"{path.parent}/"
+    return perhaps(name.partition(":")[0], known) or perhaps(path.name, beside, before=folder)
 
 
 _NUMBERS = ("observation_clip", "variance_floor")

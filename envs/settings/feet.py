@@ -11,7 +11,7 @@ from itertools import pairwise
 from math import radians
 from typing import Any, NamedTuple
 
-from springfoot.errors import SpringfootError, require_within
+from springfoot.errors import SpringfootError, perhaps, require_within
 from springfoot.gait.springs.stiffness import SPRINGS, StiffnessSchedule
 
 from ..physics.foot import LOCK, WAYS, Feet, Foot, FootJoint, Spring
@@ -89,6 +89,11 @@ toe, or a torque-angle line (`ankle_table`, `toe_table`). `adaptive`: the policy
 fixed; or both are as a `schedule` says, a `StiffnessSchedule` in JSON form. `weak`: the plantarflexor moment is limited
 to a share of `envs.physics.model.TORQUE_LIMIT`. `drop`: the ankle's muscles are slack while the leg swings.
 """
+PLACES = {
+    "orthosis": '; an orthosis is a key of a foot: {"kind": "intact", "orthosis": {"ankle_stiffness": 200}}',
+    "prosthesis": "; a prosthesis is 'passive', or 'adaptive' if the policy sets its stiffness",
+}
+"""Word that is no kind -> the end of a message, which says where it belongs."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -147,7 +152,8 @@ def _checked_foot(name: str, value: Any) -> str | dict[str, Any]:
     kind = value.get("kind") if isinstance(value, Mapping) else value
     if not isinstance(kind, str) or kind not in KINDS:
         form = "" if isinstance(value, (str, Mapping)) else ", or a dictionary with one of them as its 'kind'"
-        raise SpringfootError(f"{name} must be one of {', '.join(map(repr, KINDS))}{form}, got {kind!r:.60}")
+        hint = PLACES.get(kind) or perhaps(kind, KINDS) if isinstance(kind, str) else ""
+        raise SpringfootError(f"{name} must be one of {', '.join(map(repr, KINDS))}{form}, got {kind!r:.60}{hint}")
     if not isinstance(value, Mapping):
         return kind
     if "adapted" in value:  # of files of before
@@ -229,9 +235,12 @@ def _checked_table(name: str, value: Any) -> list[list[float]]:
             raise SpringfootError(f"{name}: angles must ascend, got {next_angle:g} deg after {angle:g} deg")
         fall = (torque - next_torque) / radians(next_angle - angle)
         if not TABLE_SLOPE.low <= fall <= TABLE_SLOPE.high:
+            signs = (
+                "; angle and torque are positive in dorsiflexion (toe up): a foot bent that way pushes back, below 0"
+            )
             raise SpringfootError(
                 f"{name}: the torque must fall by {TABLE_SLOPE.low:g} to {TABLE_SLOPE.high:g} {TABLE_SLOPE.unit}, "
-                f"got {fall:.4g} between {angle:g} and {next_angle:g} deg"
+                f"got {fall:.4g} between {angle:g} and {next_angle:g} deg{signs if fall < 0 else ''}"
             )
     return plain
 
@@ -257,7 +266,10 @@ def _checked_numbers(
     """
     for key in given:
         if key not in known:
-            raise SpringfootError(f"{name}: {owner} has no {key!r:.40}; valid: {', '.join([*known, *further])}")
+            valid = (*known, *further)
+            raise SpringfootError(
+                f"{name}: {owner} has no {key!r:.40}; valid: {', '.join(valid)}{perhaps(str(key), valid)}"
+            )
     return {
         key: require_within(f"{name}: {key}", given[key], (allowed.low, allowed.high), allowed.unit)
         for key, allowed in known.items()

@@ -15,10 +15,10 @@ from springfoot.agents.policies.baselines import (
     own_settings,
 )
 from springfoot.agents.policies.foreign import is_function
-from springfoot.agents.policies.policy import SHIPPED, load_policy
+from springfoot.agents.policies.policy import SHIPPED, load_policy, perhaps_policy
 from springfoot.agents.policies.schedule_files import schedule_file
 from springfoot.envs.settings.settings import CONDITION_SETTINGS, BipedSettings, settings_from, settings_to_json
-from springfoot.errors import SpringfootError, perhaps
+from springfoot.errors import SpringfootError
 
 from .open_loop import Watch, open_loop_copy
 
@@ -66,7 +66,7 @@ def policy_and_settings(
         names = ", ".join((*SHIPPED, *BASELINES))
         raise SpringfootError(
             f"no policy {name!r}: give a .safetensors or .onnx file, a run folder, a schedule in a .csv or .json file, "
-            f"module:function, {FROZEN}:POLICY, or one of {names}{perhaps(kind, (*SHIPPED, *BASELINES, FROZEN))}"
+            f"module:function, {FROZEN}:POLICY, or one of {names}{perhaps_policy(name, (*SHIPPED, *BASELINES, FROZEN))}"
         )
     policy = load_policy(name)
     return policy, settings_from(**(settings_to_json(policy.settings) | overriding))

@@ -13,6 +13,7 @@ from springfoot.studies.base.flags import given
 # fmt: off
 EVALUATE = [
     (["--heigth", "1"], "unrecognized options: --heigth, 1; perhaps --height?"),
+    (["--push-newtons", "150"], "unrecognized options: --push-newtons, 150; perhaps --push-newton?"),
     (["--push", "100"], "unrecognized options: --push, 100; perhaps --push-newton, --push-seconds or --push-interval?"),
     (["--delay", "0.02"], "unrecognized options: --delay, 0.02; perhaps --stiffness-delay-s or --stiffness-delay-range-s?"),
     (["--height", "None"], "--height must be a number, got 'None'"),
@@ -39,7 +40,7 @@ EVALUATE = [
     (["--reward-weights", "None"], "--reward-weights must be JSON text in braces or the name of a JSON file, got 'None'"),
     (["--drawn-feet", "rigid"], "--drawn-feet must be JSON text in brackets or the name of a JSON file, got 'rigid'"),
     (["--drawn-feet", '[{"foot"'], "--drawn-feet must be JSON, but line 1, column 9: expecting ':' delimiter: '[{\"foot\"'"),
-    (["--drawn-feet", '[{"foot": "rigd"}]'], "drawn_feet[0] must be one of 'intact', 'rigid', 'rigid_toe', 'no_toe', 'passive', 'adaptive', 'weak', 'drop', got 'rigd'"),
+    (["--drawn-feet", '[{"foot": "rigd"}]'], "drawn_feet[0] must be one of 'intact', 'rigid', 'rigid_toe', 'no_toe', 'passive', 'adaptive', 'weak', 'drop', got 'rigd'; perhaps rigid?"),
     (["--drawn-bodies", '[{"leg_ratio": 2}]'], "drawn_bodies[0]: leg_ratio must be in [0.94, 1.06] (relative), got 2"),
     (["--schedule", '{"ankle": ' + "[" * 100_000], "--schedule must be JSON, but it is nested too deeply: '{\"ankle\": [[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[..."),
     (["--human", "None"], "None must be a .csv, .mot, .sto or .c3d file"),
@@ -91,6 +92,17 @@ def test_words_that_are_not_understood_are_one_printable_line_and_exit_code_2(
         code = end.code
     assert (code, *capsys.readouterr()) == (2, "", f"{said}\n")
     assert said.isprintable() and not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("typed", "meant"), [("runs/wlak", "runs/walk"), ("wlk.onnx", "walk.onnx"), ("frozen:runs/wlak/", "runs/walk")]
+)
+def test_a_policy_that_is_not_there_is_told_the_most_similar_beside_it(monkeypatch, capsys, tmp_path, typed, meant):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "runs" / "walk").mkdir(parents=True)
+    (tmp_path / "walk.onnx").touch()
+    assert main(["evaluate", typed]) == 2
+    assert capsys.readouterr().err.endswith(f"; perhaps {meant}?\n")
 
 
 def test_none_is_a_value_of_settings_that_can_be_none():

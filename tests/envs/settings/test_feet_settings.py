@@ -29,10 +29,10 @@ WAY_LIST = "one of 'dorsiflexion', 'plantarflexion'"
 OF_ADAPTIVE = f"ankle_deg, toe_deg, {RATIOS}, schedule, orthosis"
 
 WRONG_KINDS: list[tuple[Any, str]] = [
-    ("rigd", f"right_foot must be one of {KIND_LIST}, got 'rigd'"),
-    ("Rigid", f"right_foot must be one of {KIND_LIST}, got 'Rigid'"),
+    ("rigd", f"right_foot must be one of {KIND_LIST}, got 'rigd'; perhaps rigid?"),
+    ("Rigid", f"right_foot must be one of {KIND_LIST}, got 'Rigid'; perhaps rigid?"),
     ("", f"right_foot must be one of {KIND_LIST}, got ''"),
-    ("passive ", f"right_foot must be one of {KIND_LIST}, got 'passive '"),
+    ("passive ", f"right_foot must be one of {KIND_LIST}, got 'passive '; perhaps passive?"),
     (None, f"right_foot must be one of {KIND_LIST}, or a dictionary with one of them as its 'kind', got None"),
     (600, f"right_foot must be one of {KIND_LIST}, or a dictionary with one of them as its 'kind', got 600"),
     ([], f"right_foot must be one of {KIND_LIST}, or a dictionary with one of them as its 'kind', got []"),
@@ -41,11 +41,25 @@ WRONG_KINDS: list[tuple[Any, str]] = [
     ({}, f"right_foot: a dictionary needs a 'kind', one of {KIND_LIST}"),
     ({"ankle_stiffness": 600}, f"right_foot: a dictionary needs a 'kind', one of {KIND_LIST}"),
     ({"kind": None}, f"right_foot must be one of {KIND_LIST}, got None"),
-    ({"kind": "pasive"}, f"right_foot must be one of {KIND_LIST}, got 'pasive'"),
+    ({"kind": "pasive"}, f"right_foot must be one of {KIND_LIST}, got 'pasive'; perhaps passive?"),
+    (
+        {"kind": "orthosis", "ankle_stiffness": 200},
+        f"right_foot must be one of {KIND_LIST}, got 'orthosis'; an orthosis is a key of a foot: "
+        '{"kind": "intact", "orthosis": {"ankle_stiffness": 200}}',
+    ),
+    (
+        "prosthesis",
+        f"right_foot must be one of {KIND_LIST}, got 'prosthesis'; a prosthesis is 'passive', or 'adaptive' if the "
+        "policy sets its stiffness",
+    ),
     ({"kind": ["passive"]}, f"right_foot must be one of {KIND_LIST}, got ['passive']"),
     ({"kind": {"kind": "passive"}}, f"right_foot must be one of {KIND_LIST}, got {{'kind': 'passive'}}"),
 ]
 WRONG_KEYS: list[tuple[Any, str]] = [
+    (
+        {"kind": "passive", "ankle_stifness": 600},
+        f"right_foot: a foot of kind 'passive' has no 'ankle_stifness'; valid: {OF_PASSIVE}; perhaps ankle_stiffness?",
+    ),
     (
         PASSIVE | {"K": 600},
         f"right_foot: a foot of kind 'passive' has no 'K'; valid: {OF_PASSIVE}",
@@ -72,7 +86,7 @@ WRONG_KEYS: list[tuple[Any, str]] = [
     ),
     (
         {"kind": "drop", "orthosis": {"stiffness": 20}},
-        f"right_foot: orthosis: an orthosis has no 'stiffness'; valid: {OF_AN_ORTHOSIS}",
+        f"right_foot: orthosis: an orthosis has no 'stiffness'; valid: {OF_AN_ORTHOSIS}; perhaps toe_stiffness?",
     ),
     (
         {"kind": "drop", "orthosis": {"kind": "passive"}},

@@ -144,7 +144,11 @@ def foot(**numbers: Any) -> dict[str, Any]:
         (foot(toe_table="line"), "toe_table must be a list of 2 to 1000 pairs [deg, N m], got 'line'"),
         (foot(ankle_table=[[0, 9], [0, 1]]), "ankle_table: angles must ascend, got 0 deg after 0 deg"),
         (foot(ankle_table=[[0, 9], [5, 9]]), "the torque must fall by 1 to 3000 N m/rad, got 0 between 0 and 5 deg"),
-        (foot(ankle_table=[[0, 0], [5, 20]]), "must fall by 1 to 3000 N m/rad, got -229.2 between 0 and 5 deg"),
+        (
+            foot(ankle_table=[[0, 0], [5, 20]]),
+            "must fall by 1 to 3000 N m/rad, got -229.2 between 0 and 5 deg; angle and torque are positive in "
+            "dorsiflexion (toe up): a foot bent that way pushes back, below 0",
+        ),
         (foot(ankle_table=[[0, 0], [0.1, -20]]), "must fall by 1 to 3000 N m/rad, got 1.146e+04"),
         (foot(ankle_table=[[0, 0], [99, -20]]), "ankle_table: angle must be in [-60, 90] deg, got 99"),
         (foot(ankle_table=[[0, "x"], [9, -20]]), "ankle_table: torque must be in [-1000, 1000] N m, got 'x'"),
