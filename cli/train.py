@@ -31,9 +31,8 @@ EnvironmentFlags = optional_flags("EnvironmentFlags", BipedSettings, PRESET.envi
 class TrainFlags:
     """Train a policy that sets the stiffness of ankles and toes, by PPO.
 
-    The first Ctrl-C ends it in good order with a usable policy (exit code 130), the second at once; SIGTERM likewise
-    (exit code 143). Defaults shown are those of
-    the preset walk.
+    The first Ctrl-C ends it in good order with a usable policy (exit code 130), the second at once; likewise SIGTERM,
+    with exit code 143. Defaults shown are those of the preset walk.
     """
 
     out: Annotated[Path | None, FOLDER] = None

@@ -9,10 +9,10 @@ from typing import Any
 from springfoot.agents import TrainingConfig, policy_card
 from springfoot.agents.policies import SHIPPED
 from springfoot.cli.main import STUDIES
+from springfoot.command_line import field_help
 from springfoot.envs.env import SegmentedFootBiped
 from springfoot.envs.settings.settings import THEME_OF, THEMES, BipedSettings
 from springfoot.files.markdown import table
-from springfoot.studies.base.flags import field_help
 
 FOLDER = Path(__file__).parent / "reference"
 NOTE = "<!-- Made from the code by `make docs`; do not edit. -->"

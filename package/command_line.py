@@ -1,15 +1,21 @@
 """Run a command: read its flags, report bad input in one line, return an exit code."""
 
+import ast
+import dataclasses
 import errno
+import inspect
 import io
 import re
 import signal
 import sys
+import textwrap
 import threading
 from collections import Counter
 from collections.abc import Callable, Collection, Sequence
 from contextlib import redirect_stderr
 from difflib import SequenceMatcher
+from itertools import pairwise
+from types import MappingProxyType
 from typing import Any, TypeVar
 
 import tyro
@@ -43,6 +49,7 @@ def parse(
     names the flag and its fault.
     """
     words = list(sys.argv[1:] if words is None else words)
+    _join_help_lines(flags)
     output = io.StringIO()
     try:
         with redirect_stderr(output):
@@ -55,6 +62,30 @@ def parse(
         print(f"{program}: error: {repeated} is given twice; give it once", file=sys.stderr)
         raise SystemExit(2)
     return parsed
+
+
+def field_help(settings: type) -> dict[str, str]:
+    """Return field -> the docstring below it in the source of the dataclass `settings`, on one line."""
+    body = ast.parse(textwrap.dedent(inspect.getsource(settings))).body[0].body  # type: ignore[attr-defined]
+    # A field with a text right below it.
+    return {
+        item.target.id: " ".join(str(doc.value.value).split())
+        for item, doc in pairwise(body)
+        if isinstance(item, ast.AnnAssign)
+        and isinstance(item.target, ast.Name)
+        and isinstance(doc, ast.Expr)
+        and isinstance(doc.value, ast.Constant)
+    }
+
+
+def _join_help_lines(flags: type) -> None:
+    """Give tyro the help of each field of a dataclass on one line, as it keeps breaks before indented lines."""
+    help_of = {}
+    for owner in reversed(flags.__mro__):
+        help_of |= field_help(owner) if dataclasses.is_dataclass(owner) else {}
+    for item in dataclasses.fields(flags):
+        if item.name in help_of:
+            item.metadata = MappingProxyType({**item.metadata, "help": help_of[item.name]})  # tyro's name for it
 
 
 def _repeated_flag(words: Sequence[str], repeatable: Collection[str]) -> str:

@@ -1,19 +1,16 @@
 """Make command-line flags from dataclasses of settings, where name, type and help of each flag stand once."""
 
-import ast
 import dataclasses
-import inspect
 import json
-import textwrap
 from collections.abc import Mapping
 from functools import partial
-from itertools import pairwise
 from pathlib import Path
 from types import MappingProxyType, NoneType
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import tyro
 
+from springfoot.command_line import field_help
 from springfoot.envs.settings import CONDITION_SETTINGS, FOOT_SETTINGS, THEME_OF, THEMES, BipedSettings
 from springfoot.errors import SpringfootError, quoted
 from springfoot.files.json_file import json_fault, keys_once, read_array, read_object
@@ -21,20 +18,6 @@ from springfoot.gait.people import read_gait
 from springfoot.gait.springs import StiffnessSchedule, read_foot
 
 from .flag_words import NOT_GIVEN, flag_of, reader_of_words
-
-
-def field_help(settings: type) -> dict[str, str]:
-    """Return field -> the docstring below it in the source of the dataclass `settings`, on one line."""
-    body = ast.parse(textwrap.dedent(inspect.getsource(settings))).body[0].body  # type: ignore[attr-defined]
-    # A field with a text right below it.
-    return {
-        item.target.id: " ".join(str(doc.value.value).split())
-        for item, doc in pairwise(body)
-        if isinstance(item, ast.AnnAssign)
-        and isinstance(item.target, ast.Name)
-        and isinstance(doc, ast.Expr)
-        and isinstance(doc.value, ast.Constant)
-    }
 
 
 def read_json(words: list[str], opening: str = "{") -> Any:

@@ -1,5 +1,6 @@
 """train.py as it is typed: flags, refusals that leave nothing behind, Ctrl-C, and going on."""
 
+import itertools
 import json
 import math
 import re
@@ -41,6 +42,17 @@ def test_every_setting_is_a_flag_with_the_settings_own_help(monkeypatch, capsys)
         assert name == "environment" or f"--{name.replace('_', '-')} " in text
     assert "Commanded walking speed [m/s]. (default: 1.2)" in text
     assert "None" not in text.replace("(default: None)", "")
+
+
+def test_help_breaks_lines_only_where_they_are_full(monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", "80")
+    with pytest.raises(SystemExit):
+        main(monkeypatch, "--help")
+    lines = [line.strip("│ ") for line in capsys.readouterr().out.splitlines()]
+    (first,) = (k for k, line in enumerate(lines) if line.startswith("--begin-from"))
+    text = [line.removeprefix("--begin-from FOLDER").strip() for line in lines[first : first + 4]]
+    assert text[0].startswith("Folder of a run") and text[3].endswith("not.")
+    assert all(len(line) + 1 + len(after.split()[0]) > 53 for line, after in itertools.pairwise(text))
 
 
 def flagged(*words: str) -> dict:
