@@ -12,7 +12,7 @@ import numpy as np
 from springfoot.arrays import NDArray
 from springfoot.gait.springs.stiffness import StiffnessSchedule
 
-from ..physics.foot import LOCK, Feet
+from ..physics.foot import Feet
 from ..physics.kernel import part
 from ..settings.settings import BipedSettings
 from .phase_table import GRID, SAMPLES, PhaseTable, read
@@ -120,7 +120,7 @@ def foot_rows(settings: BipedSettings, feet: Sequence[Feet], known: Sequence[Fee
                 row["stiffness"][side, index] = joint.device.stiffness if joint.device else 0.0
                 if joint.device and joint.device.table:
                     row["line"][side, index] = tables.index(joint.device.table)
-                row["locked"][side, index] = joint.device == LOCK
+                row["locked"][side, index] = joint.is_locked
     return rows
 
 

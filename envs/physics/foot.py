@@ -82,6 +82,11 @@ class FootJoint:
         """Return True without a device of either kind."""
         return self.device is None and self.rest is None
 
+    @property
+    def is_locked(self) -> bool:
+        """Return True if a lock holds it."""
+        return self.device == LOCK
+
 
 @dataclass(frozen=True, kw_only=True)
 class Foot:

@@ -12,7 +12,7 @@ import numpy as np
 
 from springfoot.arrays import NDArray
 from springfoot.envs.physics.energy import ledger_entries
-from springfoot.envs.physics.model import JOINTS
+from springfoot.envs.physics.model import JOINTS, SIDES
 from springfoot.envs.physics.timing import ACTION_STEP
 from springfoot.envs.settings.settings import DEFAULT_WEIGHTS, body_of, reference_gait, settings_to_json
 from springfoot.envs.task.reward import TERMS
@@ -81,6 +81,7 @@ def _metrics(recording: Recording, tally: StrideTally) -> dict[str, Any]:
     toe_off = _mean(tally.toe_off)
     plan_x, plan_z = recording.plan_com.T
     com_z = tally.com.mean("z")
+    legs = leg_numbers(tally) if feet_differ(settings) else None
 
     def joint(name: str) -> dict[str, Any]:
         """Return the entry of a joint in `joints`: the likeness of its angle to people's."""
@@ -112,12 +113,15 @@ def _metrics(recording: Recording, tally: StrideTally) -> dict[str, Any]:
         return score.correlation(both.mean(f"{name}_bw"), human.mean(name, phase))
 
     def stiffness(name: str) -> dict[str, Any]:
-        """Return the entry of ankle or toe in `stiffness_Nm_rad`: mean K in each part of the stride."""
+        """Return the entry of ankle or toe in `stiffness_Nm_rad`: mean K in each part of the stride, where one leg's
+        joint is locked, of the other alone."""
+        free = [side for side, foot in zip(SIDES, settings.feet, strict=True) if not getattr(foot, name).is_locked]
+        if legs is not None and len(free) == 1:
+            return legs[free[0]]["stiffness_Nm_rad"][name]
         swing_begin = USUAL_TOE_OFF if toe_off is None else toe_off
         return score.phase_means(both.mean(f"{name}_stiffness_Nm_per_rad"), swing_begin)
 
     work = _joint_work(tally)
-    legs = leg_numbers(tally) if feet_differ(settings) else None
     return {
         "policy": recording.policy,
         "environment": settings_to_json(settings),

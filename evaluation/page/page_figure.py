@@ -9,7 +9,7 @@ import numpy as np
 from springfoot.arrays import NDArray
 from springfoot.envs.control.stiffness_control import stiffness_ranges
 from springfoot.envs.physics.contact import contact_offsets
-from springfoot.envs.physics.foot import LOCK, FootJoint
+from springfoot.envs.physics.foot import FootJoint
 from springfoot.envs.physics.model import SIDES
 from springfoot.envs.settings.feet import ENGAGES, KINDS, ORTHOSIS_NUMBERS, SEGMENT_RATIOS, FootSetting
 from springfoot.envs.settings.settings import BipedSettings, body_of
@@ -128,7 +128,7 @@ def _at_joint(joint: FootJoint) -> str:
     """Return the word for the mechanism at a joint: muscles, lock or device."""
     if joint.device is None:
         return "muscles"
-    return "lock" if joint.device == LOCK else "device"
+    return "lock" if joint.is_locked else "device"
 
 
 def foot_words(setting: FootSetting) -> str:

@@ -1,6 +1,7 @@
 """Print the table of an evaluation in the terminal: the walk's numbers beside people's, readable in 60 columns."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,9 +12,10 @@ from rich.markup import escape
 from rich.table import Table
 
 from springfoot.envs.physics.model import LEFT, RIGHT
+from springfoot.envs.settings.feet import FOOT_SETTINGS
 from springfoot.envs.settings.settings import BipedSettings, body_of, reference_gait, settings_from
 from springfoot.errors import printable
-from springfoot.files.markdown import plus_minus, text_of
+from springfoot.files.markdown import MISSING, plus_minus, text_of
 from springfoot.gait import GRAVITY, HumanGait
 from springfoot.gait.people import scores as score
 from springfoot.gait.people.gait_events import PERCENT
@@ -49,18 +51,31 @@ def print_tables(walks: Sequence[dict[str, Any]], console: Console | None = None
     else:
         for metrics in walks:
             _print_head([metrics], console)
-            console.print(_table_of_one(metrics, console.width < NARROW))
+            console.print(_fitting(partial(_table_of_one, metrics), console))
+            console.print()
             _print_notes(metrics, console)
-    for line in _legend(walks, with_likeness=not one_table):
-        _print_line(line, console)
+    if any(metrics["strides"]["count"] for metrics in walks):  # without strides there are no words to explain
+        for line in _legend(walks, with_likeness=not one_table):
+            _print_line(line, console)
 
 
 def _fits(table: Table, console: Console) -> bool:
     """Return True if a table can be printed uncut; a console that is no terminal is made as wide as it."""
-    columns = console.measure(table, options=console.options.update(width=ANY_WIDTH)).maximum
+    columns = _columns(table, console)
     if not console.is_terminal:
         console.width = max(console.width, columns)
     return columns <= console.width
+
+
+def _columns(table: Table, console: Console) -> int:
+    """Return how many columns a table takes uncut."""
+    return console.measure(table, options=console.options.update(width=ANY_WIDTH)).maximum
+
+
+def _fitting(make: Callable[[bool], Table], console: Console) -> Table:
+    """Return the table that `make` returns, the narrow one, `make(True)`, if the other would be cut."""
+    table = make(False)
+    return table if _columns(table, console) <= console.width else make(True)
 
 
 def _print_line(text: str, console: Console, style: str = "") -> None:
@@ -93,18 +108,34 @@ def _world(metrics: dict[str, Any]) -> str:
 
 
 def _print_notes(metrics: dict[str, Any], console: Console, of_policy: str = "") -> None:
-    """Print below the table of an evaluation the table of its legs, its fault, its falls and its own people, where
-    there are any; each note begins with the words `of_policy`."""
-    if metrics["per_leg"] is not None:
-        console.print(_leg_table(metrics, console.width < NARROW, f"{of_policy}each leg"))
+    """Print below the table of an evaluation the table of its legs, its fault, its falls, a hint if all fell, and its
+    own people, where there are any; each note begins with the words `of_policy`."""
+    if metrics["per_leg"] is not None and metrics["strides"]["count"]:
+        console.print(_fitting(partial(_leg_table, metrics, heading=f"{of_policy}each leg"), console))
+        console.print()
     if warning := fault(metrics):
         _print_line(of_policy + warning, console, "bold red")
     for reason, count in metrics["fall_reasons"].items():
         _print_line(f"{of_policy}{count} × {reason}", console)
+    if _all_fell(metrics):
+        _print_line(f"{of_policy}Every episode fell: {_hint_on_falls(metrics['environment'])}", console)
     if metrics["environment"]["human"] is not None:
         people = metrics["reference"]
         borrowed = ", ".join(people["borrowed"]) or "nothing"
         _print_line(f"{of_policy}own: {people['condition']}; people's instead: {borrowed}", console)
+
+
+def _all_fell(metrics: dict[str, Any]) -> bool:
+    """Return True if every episode fell."""
+    return metrics["falls"] == metrics["episodes"]
+
+
+def _hint_on_falls(environment: dict[str, Any]) -> str:
+    """Return what to try after nothing but falls in an `environment`, the settings in metrics.json."""
+    tuned = environment["acts"] == "stiffness" and environment["person"] == "tuned" and environment["guide"] == "people"
+    if tuned and any(environment[foot] != "intact" for foot in FOOT_SETTINGS):
+        return "on these feet try --person learned"
+    return "springfoot live shows how"
 
 
 def _people_word(metrics: dict[str, Any]) -> str:
@@ -142,8 +173,11 @@ LIKENESS = (
 """Lines of the legend for the columns r and in ±SD."""
 LIKENESS_ELSEWHERE = ("correlation, and share of the stride inside people's mean ± SD: metrics.json",)
 """Line of the legend in place of `LIKENESS`, where a table lacks these columns."""
-BOTH_LEGS = ("both legs: means of the two; feedback: of legs whose stiffness the policy sets",)
-"""Line of the legend for a walk whose feet differ."""
+BOTH_LEGS = (
+    "both legs: means of the two; feedback: of legs whose stiffness the policy sets",
+    "stiffness of both legs: without a joint that is locked",
+)
+"""Lines of the legend for a walk whose feet differ."""
 WORDS = (
     "BW: body weights; J/kg: of one leg in a stride (energy: of both; CoM: in a step)",
     "cost of transport: positive work of joints / (weight · distance), no unit",
@@ -168,7 +202,8 @@ def _table_of_one(metrics: dict[str, Any], narrow: bool) -> Table:
     for section in _sections(metrics):
         for row in section:
             labels = [f"{row.label}, {row.unit}" if row.unit else row.label] if narrow else [row.label, row.unit]
-            table.add_row(*labels, row.model, row.people, row.r, row.inside)
+            if not _left_out([row.model], [metrics]):
+                table.add_row(*labels, row.model, row.people, row.r, row.inside)
         table.add_section()
     return table
 
@@ -176,21 +211,27 @@ def _table_of_one(metrics: dict[str, Any], narrow: bool) -> Table:
 def _table_of_several(walks: Sequence[dict[str, Any]]) -> Table:
     """Return the table of several evaluations beside the same people; a row that one lacks is empty there."""
     table = _empty_table(("", ""))
-    table.show_edge = False  # so that two policies fit into 80 columns
     for name in (*(metrics["policy"] for metrics in walks), _people_word(walks[0])):
         table.add_column(escape(name), justify="right", no_wrap=True)
     for sections in zip(*map(_sections, walks), strict=True):  # the same section of each walk
         rows_of = [{(row.label, row.unit): row for row in section} for section in sections]
         for key in dict.fromkeys(key for rows in rows_of for key in rows):
             people = next(rows[key].people for rows in rows_of if key in rows)
-            table.add_row(*key, *(rows[key].model if key in rows else "" for rows in rows_of), people)
+            cells = [rows[key].model if key in rows else "" for rows in rows_of]
+            if not _left_out(cells, walks):
+                table.add_row(*key, *cells, people)
         table.add_section()
     return table
 
 
+def _left_out(cells: Sequence[str], walks: Sequence[dict[str, Any]]) -> bool:
+    """Return True for the `cells` of a row that could not be measured in any of the `walks`, as every episode fell."""
+    return all(map(_all_fell, walks)) and all(set(cell) <= {MISSING, "/"} for cell in cells)
+
+
 def _empty_table(label_columns: Sequence[str], narrow: bool = False) -> Table:
     """Return a table with columns for the labels of its rows, which take two lines if it is `narrow`."""
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1))
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False, padding=(0, 1))  # to fit into 80 columns
     for name in label_columns:
         table.add_column(name, no_wrap=not narrow)
     return table
@@ -217,6 +258,7 @@ def leg_rows(metrics: dict[str, Any]) -> list[tuple[str, str, str, str]]:
     if metrics["per_leg"] is None:
         return []
     legs = metrics["per_leg"].values()
+    settings = settings_from(**metrics["environment"])
 
     def row(label: str, unit: str, values: Iterable[float | None], pattern: str) -> tuple[str, str, str, str]:
         """Return a row with the two legs' `values` as text."""
@@ -238,10 +280,12 @@ def leg_rows(metrics: dict[str, Any]) -> list[tuple[str, str, str, str]]:
         work = (leg["joint_work_J_kg"][joint]["positive"] for leg in legs)
         rows.append(row(f"{joint} work, positive", "J/kg", work, ".2f"))
     for joint in ("ankle", "toe"):
+        locked = [getattr(foot, joint).is_locked for foot in settings.feet]
         for part in ("loading", "mid_stance", "push_off", "swing"):
-            stiffness = (leg["stiffness_Nm_rad"][joint][part] for leg in legs)
-            rows.append(row(f"{joint} stiffness, {part.replace('_', '-')}", "N·m/rad", stiffness, ".0f"))
-    deciding = deciding_legs(settings_from(**metrics["environment"]))
+            stiffness = (text_of(leg["stiffness_Nm_rad"][joint][part], ".0f") for leg in legs)
+            left, right = (LOCKED if lock else text for lock, text in zip(locked, stiffness, strict=True))
+            rows.append((f"{joint} stiffness, {part.replace('_', '-')}", "N·m/rad", left, right))
+    deciding = deciding_legs(settings)
     left, right = ("policy" if side in deciding else "device" for side in (LEFT, RIGHT))
     return [*rows, ("stiffness is set by", "", left, right)]
 
@@ -264,9 +308,10 @@ def print_words(text: str) -> None:
     console.print(printable(text), soft_wrap=not console.is_terminal)
 
 
-NARROW, ANY_WIDTH = 76, 10_000
-"""Columns of a terminal below which the unit goes into the label, which may take two lines; numbers never do. More
-columns than any table takes."""
+ANY_WIDTH = 10_000
+"""More columns than any table takes."""
+LOCKED = "locked"
+"""Text in place of the stiffness of a lock."""
 
 
 class TableRow(NamedTuple):
@@ -286,7 +331,8 @@ def _sections(metrics: dict[str, Any]) -> list[list[TableRow]]:
 
     `metrics` is the content of metrics.json.
     """
-    people = people_metrics(settings_from(**metrics["environment"]))
+    settings = settings_from(**metrics["environment"])
+    people = people_metrics(settings)
     grf = metrics["grf"]
     their_grf = people["grf"]
     valley = grf["vertical_valley_bw"]
@@ -294,6 +340,7 @@ def _sections(metrics: dict[str, Any]) -> list[list[TableRow]]:
     com = metrics["com"]
     zmp = metrics["zmp"]
     rest = metrics["came_to_rest"]
+    lasted = [TableRow("an episode lasts", "s", text_of(metrics["seconds_mean"], ".1f"))] if metrics["falls"] else []
     at_rest = [] if rest is None else [TableRow("came to rest", "", f"{rest} of {metrics['episodes']}")]
 
     def row(
@@ -316,6 +363,11 @@ def _sections(metrics: dict[str, Any]) -> list[list[TableRow]]:
         """Return a fraction as text of its percent."""
         return text_of(None if value is None else 100 * value, ".0f")
 
+    def stiffness(joint: str, values: dict[str, float | None]) -> str:
+        """Return the stiffness of a joint in the parts of the stride as text."""
+        locked = all(getattr(foot, joint).is_locked for foot in settings.feet)
+        return LOCKED if locked else "/".join(text_of(value, ".0f") for value in values.values())
+
     def mm(label: str, value: float | None, r: float | None = None) -> TableRow:
         """Return the row of a length [m], in millimetres."""
         return row(label, "mm", None if value is None else 1000 * value, ".0f", None, r)
@@ -323,6 +375,7 @@ def _sections(metrics: dict[str, Any]) -> list[list[TableRow]]:
     return [
         [
             TableRow("falls", "", f"{metrics['falls']} of {metrics['episodes']}"),
+            *lasted,
             *at_rest,
             row("return", "", metrics["return"], ".0f"),
             row("speed", "m/s", metrics["speed_m_s"], ".3f", people["speed_m_s"]),
@@ -373,7 +426,7 @@ def _sections(metrics: dict[str, Any]) -> list[list[TableRow]]:
             mm("sole's slide a stance", metrics["contact_travel_m"]),
         ],
         [
-            TableRow(f"{name} stiffness", "N·m/rad", "/".join(text_of(v, ".0f") for v in values.values()))
+            TableRow(f"{name} stiffness", "N·m/rad", stiffness(name, values))
             for name, values in metrics["stiffness_Nm_rad"].items()
         ]
         + [

@@ -110,6 +110,42 @@ def test_table_and_pictures_tell_the_legs_apart(recordings, tmp_path):
     assert all((seen == colour).all(axis=1).sum() > 200 for colour in (NEAR, FAR))  # both legs
 
 
+def printed(metrics, width=80):
+    console = Console(record=True, width=width, force_terminal=True, color_system=None)
+    print_table(metrics, console)
+    lines = console.export_text().splitlines()
+    assert not [line for line in lines if "…" in line or len(line) > width]
+    return [" ".join(line.split()) for line in lines]
+
+
+@pytest.mark.parametrize(("foot", "joint"), [("rigid", "ankle"), ("rigid_toe", "toe")])
+def test_a_lock_is_not_averaged_with_muscles(foot, joint):
+    metrics = measure(walked(left_foot=foot)).metrics
+    sound = metrics["per_leg"]["right"]["stiffness_Nm_rad"][joint]
+    assert metrics["falls"] == 0 and max(sound.values()) < 1000.0
+    assert metrics["stiffness_Nm_rad"][joint] == sound
+    rows = printed(metrics)
+    assert f"{joint} stiffness N·m/rad {'/'.join(f'{value:.0f}' for value in sound.values())}" in rows
+    assert f"{joint} stiffness, swing N·m/rad locked {sound['swing']:.0f}" in rows
+    assert "stiffness of both legs: without a joint that is locked" in rows
+
+
+def test_two_locks_are_told_as_such():
+    rows = printed(measure(walked(left_foot="rigid", right_foot="rigid")).metrics)
+    assert any(row.startswith("ankle stiffness") and row.endswith("N·m/rad locked") for row in rows)
+
+
+def test_a_walk_that_only_fell_has_the_rows_that_have_numbers_and_a_hint():
+    policy, settings = policy_and_settings("schedule", {"episode_seconds": 6.0, "left_foot": "rigid"})
+    metrics = measure(record(policy, settings, name="schedule", episodes=1, threads=1)).metrics
+    rows = printed(metrics)
+    assert "falls 1 of 1" in rows and f"an episode lasts s {metrics['seconds_mean']:.1f}" in rows
+    assert rows[-1] == "Every episode fell: on these feet try --person learned"
+    assert not any("–" in row for row in rows) and len(rows) < 16
+    sound = metrics | {"environment": metrics["environment"] | {"left_foot": "intact"}}
+    assert "Every episode fell: springfoot live shows how" in printed(sound)
+
+
 def test_feedback_is_of_the_leg_that_decides(recordings):
     share = measure(recordings[0]).metrics["feedback"]["ankle"]["share"]
     alike = measure(recordings[2]).metrics["feedback"]["ankle"]["share"]

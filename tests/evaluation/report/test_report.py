@@ -142,8 +142,8 @@ def test_several_policies_are_the_columns_of_one_table_unless_the_terminal_is_to
         assert "schedule constant people" in lines
         assert all(f"constant: {count} × {reason}" in lines for reason, count in walks[1]["fall_reasons"].items())
     rows, lines = together(width=60, force_terminal=True, color_system=None)
-    assert rows == [f"speed, m/s {speed} 1.200" for speed in speeds]
-    assert "model people r in ±SD" in lines
+    assert rows == [f"speed, m/s {speeds[0]} 1.200"]  # the other fell too early to have one
+    assert lines.count("model people r in ±SD") == 2
 
 
 def test_policies_beside_different_people_have_a_table_each(recording):
