@@ -11,7 +11,7 @@ import tyro
 
 from springfoot.agents.training.config import PRESETS, TrainingConfig, require_not_mirrored
 from springfoot.command_line import end_in_order, exit_code, parse, stopped_by
-from springfoot.envs.settings.settings import BipedSettings, settings_from, settings_to_json
+from springfoot.envs.settings.settings import CONDITION_SETTINGS, BipedSettings, settings_from, settings_to_json
 from springfoot.errors import MOST_THREADS, SpringfootError, require_count
 from springfoot.extras import naming_extras
 from springfoot.files.writing import require_new
@@ -116,7 +116,6 @@ def run_training(flags: TrainFlags) -> int:
         folder = flags.out
         record = _train(flags, config)
     # Tell the result.
-    interrupted = record["status"] == "interrupted"
     best = record["best"]
     print(f"\n{record['timesteps']:,} steps in {record['seconds']:.0f} s, {record['status']}.")
     if best:
@@ -125,10 +124,29 @@ def run_training(flags: TrainFlags) -> int:
         if not best["timesteps"]:
             print("         It is the policy that training began with: train longer, or try last.safetensors.")
     print(f"Results: {folder} (best.safetensors, last.safetensors, run.json, TensorBoard)")
-    print(f"Next:    springfoot evaluate {_quoted(folder)}")
-    if interrupted:
-        print(f"Or:      springfoot train --resume {_quoted(folder)}")
-    return stopped_by(record) if interrupted else 0
+    print("\n".join(next_lines(record, folder)))
+    return stopped_by(record) if record["status"] == "interrupted" else 0
+
+
+def next_lines(record: dict[str, Any], folder: Path) -> list[str]:
+    """Return the lines that say what to type after a training into `folder`, whose run.json is `record`."""
+    from springfoot.agents.training.run_record import evaluations_of_one_task
+
+    environment = record["config"]["environment"]
+    standard = settings_to_json(BipedSettings())
+    evaluate = f"springfoot evaluate {_quoted(folder)}"
+    resume = f"springfoot train --resume {_quoted(folder)}"
+    interrupted = record["status"] == "interrupted"
+    first, *later = evaluations_of_one_task(record) or [{}]
+    if later and later[-1]["return_mean"] <= first["return_mean"]:
+        more = "" if interrupted else f" --timesteps {record['config']['timesteps']}"
+        returns = f"the last return, {later[-1]['return_mean']:.1f}, is not above the first, {first['return_mean']:.1f}"
+        lines = [f"Learned: nothing yet, {returns}", f"Next:    {resume}{more}", f"Or:      {evaluate}"]
+    else:
+        lines = [f"Next:    {evaluate}", *[f"Or:      {resume}"] * interrupted]
+    if any(environment[name] != standard[name] for name in CONDITION_SETTINGS):
+        lines.append("Note:    evaluate has no pushes, draws nothing unless flags ask: returns differ")
+    return lines
 
 
 def _train(flags: TrainFlags, config: TrainingConfig) -> dict[str, Any]:

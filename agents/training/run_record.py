@@ -69,17 +69,20 @@ def is_of_rllib(record: Mapping[str, Any]) -> bool:
 
 
 def best_of(record: Mapping[str, Any]) -> dict[str, Any] | None:
-    """Return the evaluation with the highest mean return, the first of equal ones; None without evaluations.
+    """Return the evaluation with the highest mean return, the first of equal ones; None without evaluations."""
+    return max(evaluations_of_one_task(record), key=lambda entry: entry["return_mean"], default=None)
 
-    If a session changed the task and measured the best policy anew, only that measurement and later evaluations are
-    compared.
+
+def evaluations_of_one_task(record: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return the evaluations whose returns can be compared, in their order.
+
+    If a session changed the task and measured the best policy anew, they are that measurement and later evaluations.
     """
     entries: list[dict[str, Any]] = record["evaluations"]
     for session in reversed(record["sessions"]):
         if "best" in session:
-            later = [entry for entry in entries if entry["timesteps"] > session["from_timesteps"]]
-            return max([session["best"], *later], key=lambda entry: entry["return_mean"])
-    return max(entries, key=lambda entry: entry["return_mean"], default=None)
+            return [session["best"], *(entry for entry in entries if entry["timesteps"] > session["from_timesteps"])]
+    return entries
 
 
 def same_source(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:

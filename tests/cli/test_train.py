@@ -183,6 +183,28 @@ def test_it_ends_with_where_the_results_lie_and_what_to_type_next(monkeypatch, c
     assert read_policy(tmp_path / "run").settings.reward_weights == {"grf": 0.1}
 
 
+def test_what_to_type_next_depends_on_what_was_learned():
+    def lines(*returns, status="finished", **settings):
+        evaluations = [{"timesteps": 1000 * k, "return_mean": value} for k, value in enumerate(returns)]
+        config = {"timesteps": 5000, "environment": settings_to_json(BipedSettings(**settings))}
+        record = {"config": config, "status": status, "sessions": [], "evaluations": evaluations}
+        return train_command.next_lines(record, Path("runs/a walk"))
+
+    evaluate, resume = "springfoot evaluate 'runs/a walk'", "springfoot train --resume 'runs/a walk'"
+    assert lines(1.0, 3.0, 2.0) == [f"Next:    {evaluate}"]
+    assert lines(1.0, 3.0, status="interrupted") == [f"Next:    {evaluate}", f"Or:      {resume}"]
+    assert (
+        lines(status="interrupted")
+        == lines(2.0, status="interrupted")
+        == [f"Next:    {evaluate}", f"Or:      {resume}"]
+    )
+    nothing = "Learned: nothing yet, the last return, 2.0, is not above the first, 2.0"
+    assert lines(2.0, 3.0, 2.0) == [nothing, f"Next:    {resume} --timesteps 5000", f"Or:      {evaluate}"]
+    assert lines(2.0, 2.0, status="interrupted") == [nothing, f"Next:    {resume}", f"Or:      {evaluate}"]
+    note = "Note:    evaluate has no pushes, draws nothing unless flags ask: returns differ"
+    assert lines(1.0, 2.0, push_newton=150.0) == lines(1.0, 2.0, mass_range=(50, 90)) == [f"Next:    {evaluate}", note]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_ctrl_c_leaves_a_usable_policy_and_a_run_to_go_on_with(tmp_path, number):
