@@ -124,7 +124,7 @@ def _run(words: list[str]) -> int:
             case []:
                 print(FIRST)
                 return 0
-            case ["-h" | "--help"]:
+            case ["-h" | "--help", *_]:
                 print(HELP)
                 return 0
             case ["--version"]:

@@ -1,6 +1,7 @@
 """The package as others get it: complete, importable floor by floor, free of anyone's paths."""
 
 import json
+import posixpath
 import re
 import shutil
 import subprocess
@@ -114,9 +115,34 @@ def test_source_distribution_holds_all_that_git_knows(sdist, known):
 def test_wheel_holds_every_file_of_the_rooms(wheel, known):
     packed = [name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name]
     ours = [name.removeprefix("package/") for name in known if name.partition("/")[0] in ("package", *ROOMS)]
-    ours += [name for name in known if re.fullmatch(r"docs/.+\.md|docs/generate\.py", name)]  # pages and their maker
+    ours += [
+        name for name in known if re.fullmatch(r"docs/.+\.(md|csv)|docs/generate\.py", name)
+    ]  # pages and their maker
     assert sorted(packed) == sorted(f"springfoot/{name}" for name in ours)
     assert "springfoot/py.typed" in packed
+
+
+def test_pages_in_the_wheel_lead_to_what_it_holds(wheel):
+    with zipfile.ZipFile(wheel) as archive:
+        names = set(archive.namelist())
+        pages = {name: archive.read(name).decode() for name in names if name.endswith(".md") and "/docs/" in name}
+    assert len(pages) > 20
+    dead = [
+        (name, link)
+        for name, page in pages.items()
+        for link in re.findall(r"\]\(([^)#]+)", page)
+        if not link.startswith("https://") and posixpath.normpath(f"{posixpath.dirname(name)}/{link}") not in names
+    ]
+    assert dead == []
+    live = pages["springfoot/docs/how-to/live.md"]
+    assert "[learned person](person.md)" in live and "png)" not in live and "\nplay.html is one file" in live
+
+
+def test_links_that_a_page_keeps_and_those_that_lead_to_the_repository():
+    page = "![The body](../live.png) and [a person](person.md#train)"
+    text = setup.linked(page, "https://host/it", "0.1.0", "docs/how-to", lambda path: path.startswith("person.md"))
+    assert text == "![The body](https://host/it/raw/v0.1.0/docs/live.png) and [a person](person.md#train)"
+    assert setup.linked(page, None, "0.1.0") == "*The body* and a person"
 
 
 def test_the_version_stands_once(metadata, capsys):
