@@ -65,15 +65,16 @@ function frame(parent, title, xUnit, yUnit, xs, ys) {
 const PERCENT = Array.from({ length: 101 }, (_, k) => k);
 const followers = []; // each is told where in the stride and the step we are, and draws its cursor there
 // What is drawn of the policies in one panel: a line each, or where its feet differ one for the left leg and a finer, paler one for the right.
-const lines = which => which.flatMap((p, i) => (p.legs || [p]).map((own, leg) => ({ ...own, shade: colour(i), dash: dash(i), width: leg ? 1.2 : 1.9, opacity: leg ? .6 : 1 })));
+const lines = which => which.flatMap((p, i) => (p.legs || [p]).map((own, leg) => ({ ...own, leg, name: [policies[i].name, ...(p.legs ? [["left", "right"][leg]] : [])].join(" "), shade: colour(i), dash: dash(i), width: leg ? 1.2 : 1.9, opacity: leg ? .6 : 1 })));
+const short = value => value === null || value === undefined ? "–" : String(+value.toPrecision(3));
 function panel(parent, which) {
   const drawn = lines(which);
   const all = [...drawn, ...which].flatMap(p => [p.mean, p.people || [], p.plan || []].flatMap((mean, k) => {
     const sd = [p.sd, p.people_sd || [], []][k];
     return known(mean.flatMap((m, j) => m === null ? [] : [m - (sd[j] || 0), m + (sd[j] || 0)]));
   })).concat(which[0].zero ? [0] : []);
-  const axis = which[0].axis || "stride"; // or the step, or one leg's phase
-  const { svg, X, Y } = frame(parent, which[0].title, { stride: "% of the stride", step: "% of the step" }[axis] || "% of the leg's phase", which[0].unit, [0, 100], all);
+  const axis = which[0].axis || "stride"; // or the step, or each leg's own phase
+  const { svg, X, Y } = frame(parent, which[0].title, { stride: "% of the stride", step: "% of the step", leg: "% of the leg's phase" }[axis], which[0].unit, [0, 100], all);
   if (axis === "stride") policies.flatMap((p, i) => [[p.toe_off[0], colour(i)], ...(i ? [] : [[p.toe_off[1], "var(--people)"]])]).forEach(([at, shade]) => {
     if (at !== null) draw(svg, "line", { x1: X(at), x2: X(at), y1: TOP, y2: HEIGHT - BOTTOM, stroke: shade, "stroke-dasharray": "2 2", class: "toe-off" });
   });
@@ -87,19 +88,60 @@ function panel(parent, which) {
     draw(svg, "path", { d: band(PERCENT, p.mean, p.sd, X, Y), fill: p.shade, opacity: .18 * p.opacity, class: "sd" });
     draw(svg, "path", { d: path(PERCENT, p.mean, X, Y), fill: "none", stroke: p.shade, "stroke-width": p.width, "stroke-opacity": p.opacity, "stroke-dasharray": p.dash, class: "mean" });
   }
-  const line = draw(svg, "line", { y1: TOP, y2: HEIGHT - BOTTOM, stroke: "var(--ink)", "stroke-width": 1, class: "cursor" });
+  const upright = name => draw(svg, "line", { y1: TOP, y2: HEIGHT - BOTTOM, stroke: "var(--ink)", "stroke-width": 1, class: name, visibility: "hidden" });
+  const line = upright("cursor"), pointer = upright("pointer");
   const dots = drawn.map(p => draw(svg, "circle", { r: 3.5, fill: p.shade, "fill-opacity": p.opacity, stroke: "var(--paper)", class: "dot" }));
   const note = draw(svg, "text", { x: WIDTH - RIGHT, y: TOP - 2, "text-anchor": "end", class: "value" });
+  let following = "";
   followers.push(where => {
-    const x = where[axis], k = Math.min(100, Math.round(x));
-    line.setAttribute("x1", X(x)); line.setAttribute("x2", X(x)); line.setAttribute("data-percent", x.toFixed(1));
+    const at = drawn.map(p => axis !== "leg" ? where[axis] : p.leg ? where.right : where.left), k = at.map(x => Math.min(100, Math.round(x)));
+    line.setAttribute("x1", X(at[0])); line.setAttribute("x2", X(at[0])); line.setAttribute("data-percent", at[0].toFixed(1)); line.setAttribute("visibility", "visible");
     dots.forEach((dot, i) => {
-      const y = drawn[i].mean[k];
+      const y = drawn[i].mean[k[i]];
       dot.setAttribute("visibility", y === null ? "hidden" : "visible");
-      if (y !== null) { dot.setAttribute("cx", X(k)); dot.setAttribute("cy", Y(y)); }
+      if (y !== null) { dot.setAttribute("cx", X(k[i])); dot.setAttribute("cy", Y(y)); }
     });
-    note.textContent = drawn.map(p => p.mean[k] === null ? "–" : +p.mean[k].toPrecision(3)).join(" / ");
+    note.textContent = following = drawn.map((p, i) => short(p.mean[k[i]])).join(" / ");
   });
+  // Where the pointer is: the values there, people's too.
+  svg.addEventListener("pointermove", event => {
+    const box = svg.getBoundingClientRect(), k = Math.round(((event.clientX - box.left) * WIDTH / box.width - LEFT) / (WIDTH - LEFT - RIGHT) * 100);
+    if (k < 0 || k > 100) return;
+    pointer.setAttribute("x1", X(k)); pointer.setAttribute("x2", X(k)); pointer.setAttribute("visibility", "visible");
+    const spread = (mean, sd) => drawn.length < 3 && sd !== null && sd !== undefined ? `${short(mean)} ± ${short(sd)}` : short(mean);
+    note.textContent = `${k} %: ${drawn.map(p => spread(p.mean[k], p.sd[k])).join(" / ")}${first.people ? ` (people ${short(first.people[k])})` : ""}`;
+  });
+  svg.addEventListener("pointerleave", () => { pointer.setAttribute("visibility", "hidden"); note.textContent = following; });
+  const heads = ["percent", ...drawn.flatMap(p => [`${p.name} mean`, `${p.name} sd`]), ...(first.people ? ["people mean", "people sd"] : [])];
+  savers(svg, which[0].title, [heads, ...PERCENT.map(k => [k, ...drawn.flatMap(p => [p.mean[k], p.sd[k]]), ...(first.people ? [first.people[k], first.people_sd[k]] : [])])]);
+}
+// Buttons below a drawing that save it as a picture, and its numbers as a table.
+function savers(svg, title, rows) {
+  const save = (suffix, url) => { const link = document.createElement("a"); link.href = url; link.download = `${title.replace(/[^\w]+/g, "_")}.${suffix}`; link.click(); };
+  const quoted = cell => /[",\n]/.test(cell) ? `"${String(cell).replaceAll('"', '""')}"` : cell ?? "";
+  const buttons = make(svg.parentElement, "div", undefined, { class: "save" });
+  make(buttons, "button", "PNG", { type: "button", "aria-label": `PNG of ${title}` }).addEventListener("click", () => picture(svg, url => save("png", url)));
+  make(buttons, "button", "CSV", { type: "button", "aria-label": `CSV of ${title}` }).addEventListener("click", () =>
+    save("csv", `data:text/csv;charset=utf-8,${encodeURIComponent(rows.map(row => row.map(quoted).join(",")).join("\r\n"))}`));
+}
+// A picture of a drawing, twice its size, as a data URL: with the page's colours and font in it, which a picture does not inherit.
+function picture(svg, done) {
+  const copy = svg.cloneNode(true), [, , wide, tall] = svg.getAttribute("viewBox").split(" ").map(Number), style = getComputedStyle(document.documentElement);
+  copy.setAttribute("width", 2 * wide); copy.setAttribute("height", 2 * tall);
+  const texts = svg.querySelectorAll("text");
+  copy.querySelectorAll("text").forEach((text, i) => { const own = getComputedStyle(texts[i]); text.setAttribute("style", `fill:${own.fill};font:${own.fontWeight} ${own.fontSize} ${own.fontFamily}`); });
+  const paper = document.createElementNS(SVG, "rect");
+  for (const [name, value] of Object.entries({ width: wide, height: tall, fill: "var(--paper)" })) paper.setAttribute(name, value);
+  copy.prepend(paper);
+  const text = new XMLSerializer().serializeToString(copy).replace(/var\((--\w+)\)/g, (_, name) => style.getPropertyValue(name).trim());
+  const image = new Image();
+  image.onload = () => {
+    const canvas = document.createElement("canvas");
+    canvas.width = 2 * wide; canvas.height = 2 * tall;
+    canvas.getContext("2d").drawImage(image, 0, 0);
+    done(canvas.toDataURL("image/png"));
+  };
+  image.src = `data:image/svg+xml;charset=utf-8,${encodeURIComponent(text)}`;
 }
 function loop(parent, which) {
   const drawn = lines(which), each = [...drawn, ...which];
@@ -116,6 +158,7 @@ function loop(parent, which) {
     dot.setAttribute("visibility", p.x[k] === null ? "hidden" : "visible");
     if (p.x[k] !== null) { dot.setAttribute("cx", X(p.x[k])); dot.setAttribute("cy", Y(p.y[k])); }
   }));
+  savers(svg, which[0].title, [["percent", ...drawn.flatMap(p => [`${p.name} angle`, `${p.name} moment`])], ...PERCENT.map(k => [k, ...drawn.flatMap(p => [p.x[k], p.y[k]])])]);
 }
 function bars(parent, policies) {
   const names = Object.keys(policies[0].metrics.energy_J_kg), values = policies.map(p => names.map(name => p.metrics.energy_J_kg[name]));
@@ -145,9 +188,8 @@ const plus = (a, b) => [a[0] + b[0], a[1] + b[1]];
 function walker(parent, policy, i) {
   const f = policy.figure, frames = f.base.length, size = f.height / 1.7, L = f.lengths;
   const figure = make(parent, "figure"), svg = draw(figure, "svg", { viewBox: "0 0 400 360", role: "img", "aria-label": `${policy.name}, animated` });
-  if (parent.matches(".verdict")) parent.querySelector("h2").after(figure); // several: the bodies in a row, their verdicts below
   const scale = 155 / size, floor = 325;
-  make(figure, "figcaption", `${policy.name}: left foot ${f.feet[0].words}, right foot ${f.feet[1].words}. The left leg has the policy's colour. Arrows: ground force, paler the right one's. Dot: centre of mass, ring: its plan. ▲ centre of pressure, △ planned ZMP. Ankle and toe from dark blue (soft) to yellow (stiff)${f.feet.some(foot => foot.joints.some(at => at !== "muscles")) ? "; a square is a device in place of muscles, an open one locked" : ""}${f.feet.some(foot => foot.orthosis) ? "; the line behind the leg is an orthosis" : ""}.`);
+  make(figure, "figcaption", `${policy.name}: left foot ${f.feet[0].words}, right foot ${f.feet[1].words}`);
   const ground = draw(svg, "line", { stroke: "var(--faint)", x1: 0, x2: 400 }), marks = draw(svg, "g", {});
   const layer = draw(svg, "g", { "stroke-linecap": "round", "stroke-linejoin": "round" });
   const line = (width, shade) => draw(layer, "polyline", { fill: "none", stroke: shade, "stroke-width": width * size * scale });

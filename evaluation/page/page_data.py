@@ -10,10 +10,11 @@ import numpy as np
 
 from springfoot.arrays import NDArray
 from springfoot.envs.physics.model import SIDES
-from springfoot.envs.settings.settings import body_of, reference_gait
+from springfoot.envs.settings.settings import BipedSettings, body_of, reference_gait
 from springfoot.envs.task.reward import TERMS
 from springfoot.gait import HumanGait
 from springfoot.gait.people.gait_events import PERCENT
+from springfoot.gait.people.human import ADULTS
 from springfoot.gait.springs.stiffness import SPRINGS, thesis_schedule
 
 from ..numbers.curves import StrideCurves
@@ -40,7 +41,7 @@ def policy_data(recording: Recording, gait: Gait) -> dict[str, Any]:
     return {
         "name": recording.policy,
         "metrics": gait.metrics,
-        "people": f"people at {human.speed:.2f} m/s" if recording.settings.human is None else human.condition,
+        "people": people_words(recording.settings, human),
         "toe_off": shown_numbers(
             np.array([np.nan if (t := gait.metrics["toe_off_percent"]) is None else t, 100 * human.toe_off])
         ),
@@ -54,6 +55,14 @@ def policy_data(recording: Recording, gait: Gait) -> dict[str, Any]:
         "loops": _loops(recording, gait, human, by_leg),
         "figure": figure_data(recording),
     }
+
+
+def people_words(settings: BipedSettings, human: HumanGait) -> str:
+    """Return whose the grey curves are, and of what their band is the spread."""
+    if settings.human is None:
+        return f"people at {human.speed:.2f} m/s, mean ± SD over {ADULTS} adults"
+    borrowed = ", of people where it has no data" if human.borrowed else ""
+    return f"the own person {human.condition}, mean ± SD over its strides{borrowed}"
 
 
 def _panel(group: str, title: str, unit: str, curve: tuple[NDArray, NDArray], **entries: Any) -> dict[str, Any]:
@@ -159,7 +168,8 @@ def _com(recording: Recording, gait: Gait) -> list[dict[str, Any]]:
 
 
 def _springs(recording: Recording) -> list[dict[str, Any]]:
-    """Return the panels of K and theta_eq over the leg's phase: the mean is the open-loop copy, the SD is feedback."""
+    """Return the panels of K and theta_eq, both legs on one pair of axes, over each leg's phase: the mean is the
+    open-loop copy, the SD is feedback."""
     curves = schedule_curves(recording)
     group = "Stiffness and equilibrium over the leg's phase"
     panels = []
@@ -168,12 +178,11 @@ def _springs(recording: Recording) -> list[dict[str, Any]]:
         ("equilibrium_deg", "equilibrium θ_eq", "dorsiflexion or up, deg"),
     ):
         for joint in SPRINGS:
-            for side in SIDES:
-                name = f"{joint}_{side}_{column}"
-                title = f"{side.capitalize()} {joint}, {words}"
-                panels.append(
-                    _panel(group, title, unit, (curves[name], curves[f"{name}_sd"]), zero=unit == "N·m/rad", axis=side)
-                )
+            names = [f"{joint}_{side}_{column}" for side in SIDES]
+            legs = [{"mean": shown_numbers(curves[n]), "sd": shown_numbers(curves[f"{n}_sd"])} for n in names]
+            left = curves[names[0]], curves[f"{names[0]}_sd"]
+            title = f"{joint.capitalize()}, {words}"
+            panels.append(_panel(group, title, unit, left, zero=unit == "N·m/rad", axis="leg", legs=legs))
     return panels
 
 

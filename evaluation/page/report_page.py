@@ -6,11 +6,12 @@ would not draw the body.
 
 import json
 from collections.abc import Mapping, Sequence
+from datetime import date
 from html import escape
 from pathlib import Path
 from typing import Any
 
-from springfoot.envs.settings.settings import settings_from
+from springfoot.envs.settings.settings import BipedSettings, settings_from
 from springfoot.files.provenance import versions_and_commit
 
 from ..numbers.criteria import (
@@ -23,8 +24,9 @@ from ..numbers.criteria import (
     with_derived,
 )
 from ..numbers.metrics import Gait
+from ..numbers.per_leg import leg_numbers
 from ..recording.recording import Recording
-from ..report.gait_table import leg_rows, people_metrics, table_rows
+from ..report.gait_table import leg_numbers_beside_people, people_metrics, table_rows
 from .page_data import policy_data
 from .page_figure import walker_words
 from .template import as_json, filled
@@ -43,14 +45,34 @@ def write_page(path: Path, walks: Sequence[tuple[Recording, Gait]], command: str
         walks: recording and measured gait of each policy.
         command: command line that made the page, which it shows; empty for none.
     """
+    _, first = walks[0]
+    own = first.metrics["environment"]["human"] is not None
     data = {
         "policies": [policy_data(recording, gait) for recording, gait in walks],
         "tables": [table_rows(gait.metrics) for _, gait in walks],
-        "legs": [leg_rows(gait.metrics) for _, gait in walks],
+        "legs": [_leg_rows(recording, gait) for recording, gait in walks],
+        "norm": "own person" if own else "people",
         "made": _origin_text(walks, command),
     }
-    verdicts = "\n".join(_verdict(index, gait.metrics) for index, (_, gait) in enumerate(walks))
-    path.write_text(filled("page.html", {"VERDICT": verdicts, "DATA": as_json(data)}), encoding="utf-8")
+    spoken = [spoken_verdict(gait.metrics, leg_numbers(gait.tally)) for _, gait in walks]
+    blocks = {
+        "ORIGIN": f"{date.today():%-d %B %Y}. Grey: {escape(data['policies'][0]['people'])}.",
+        "WHO": "\n".join(_who(index, gait.metrics, spoken[index]) for index, (_, gait) in enumerate(walks)),
+        "VERDICT": "\n".join(_verdict(index, gait.metrics, spoken[index]) for index, (_, gait) in enumerate(walks)),
+        "DATA": as_json(data),
+    }
+    path.write_text(filled("page.html", blocks), encoding="utf-8")
+
+
+def _leg_rows(recording: Recording, gait: Gait) -> list[tuple[str, ...]]:
+    """Return the rows of the table of both legs: quantity, unit, left, right, right less left, people."""
+    rows = []
+    for row in leg_numbers_beside_people(leg_numbers(gait.tally), recording.settings):
+        known = isinstance(row.left, float) and isinstance(row.right, float)
+        difference = row.right - row.left if known else None  # type: ignore[operator]
+        texts = (*map(row.text, (row.left, row.right)), _text(difference, f"+{row.pattern}"), row.text(row.people))
+        rows.append((row.label, row.unit, *texts))
+    return rows
 
 
 def _origin_text(walks: Sequence[tuple[Recording, Gait]], command: str) -> str:
@@ -71,18 +93,40 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7
 """Colours of the policies, in their order; as in page.html."""
 
 
-def _verdict(index: int, metrics: dict[str, Any]) -> str:
-    """Return the HTML of the verdict on policy number `index`; `metrics` is the content of its metrics.json."""
+def _who(index: int, metrics: dict[str, Any], spoken: Mapping[str, str]) -> str:
+    """Return the HTML of the line on the walker of policy number `index`: the `spoken` words on it and its falls."""
     colour = COLOURS[index % len(COLOURS)]
-    items = "".join(f"<dt>{escape(term)}</dt><dd>{escape(text)}</dd>" for term, text in spoken_verdict(metrics).items())
+    words = f"{spoken['Walker']} {spoken['Falls']}"
+    return (
+        f'<li class="name" style="border-color:{colour}"><strong>{escape(metrics["policy"])}</strong>: '
+        f"{escape(words)}</li>"
+    )
+
+
+def _verdict(index: int, metrics: dict[str, Any], spoken: Mapping[str, str]) -> str:
+    """Return the HTML of the `spoken` verdict on policy number `index`, without the words of `_who`."""
+    colour = COLOURS[index % len(COLOURS)]
+    items = "".join(
+        f"<dt>{escape(term)}</dt><dd>{escape(text)}</dd>"
+        for term, text in spoken.items()
+        if term not in ("Falls", "Walker")
+    )
     return (
         f'<section class="verdict" aria-label="Verdict on {escape(metrics["policy"])}">'
         f'<h2 class="name" style="border-color:{colour}">{escape(metrics["policy"])}</h2><dl>{items}</dl></section>'
     )
 
 
-def spoken_verdict(metrics: dict[str, Any]) -> dict[str, str]:
-    """Return the verdict in words: heading -> sentences on falls, walker, faults, speed, joints, forces and energy."""
+def spoken_verdict(metrics: Mapping[str, Any], legs: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
+    """Return the verdict in words: heading -> sentences on falls, walker, faults, speed, joints, forces and energy.
+
+    At the speed for which the criteria were chosen they judge the walk. At other speeds, and beside an own person, it
+    is held against the curves of people, or of that person, at its speed.
+
+    Args:
+        metrics: content of metrics.json.
+        legs: of `leg_numbers`.
+    """
     environment = metrics["environment"]
     settings = settings_from(**environment)
     people = people_metrics(settings)
@@ -98,37 +142,64 @@ def spoken_verdict(metrics: dict[str, Any]) -> dict[str, str]:
     work = metrics["joint_work_J_kg"]["ankle"]
     verdict = {
         "Falls": f"{falls_text} Mean length {metrics['seconds_mean']:.1f} s.",
-        "Walker": f"{walker_words(settings)}.",
+        "Walker": f"{walker_words(settings)}, {environment['speed']:g} m/s, {_followed(settings)}.",
     }
     if metrics["strides"]["count"] == 0:
         return verdict | {"Gait": "No complete stride after the warm-up, so nothing of the gait could be measured."}
+    whose = "people" if environment["human"] is None else "the own person"
     angles = ", ".join(f"{name} {_text(errors['rmse_deg'], '.1f')}°" for name, errors in joints.items())
+    inside = ", ".join(f"{name} {_text(errors['within_1sd_percent'], '.0f')} %" for name, errors in joints.items())
     peaks = " / ".join(_text(grf[name], ".2f") for name in _PEAKS)
     people_peaks = " / ".join(_text(people["grf"][name], ".2f") for name in _PEAKS)
     if warning := fault(metrics):
         verdict["Warning"] = warning
+    angles_judged = (
+        _judged(metrics, MOVES_LIKE_PEOPLE) if judged else f"Inside {whose}'s mean ± SD: {inside} of the stride."
+    )
+    forces_judged = _judged(metrics, LOADS_LIKE_PEOPLE) if judged else ""
+    price = (
+        f"Fibre work {_text(metrics['effort']['fibre_J_kg_m'], '.2f')} J/kg/m, {whose}'s {people['fibre_J_kg_m']:.2f}."
+    )
+    energy_judged = _judged(metrics, WORKS_LIKE_PEOPLE) if judged else price
+    forces = f"Vertical peak, valley, peak {peaks} body weights, {whose}'s {people_peaks}."
     return verdict | {
         "Speed": f"{_text(metrics['speed_m_s']['mean'], '.2f')} m/s, asked for {environment['speed']:.2f}.",
-        "Joints": f"Off people's mean by {angles} (rms). {_judged(metrics, MOVES_LIKE_PEOPLE, judged)}",
-        "Forces": f"Vertical peak, valley, peak {peaks} body weights, people {people_peaks}. "
-        f"{_judged(metrics, LOADS_LIKE_PEOPLE, judged)}",
+        "Joints": f"Off {whose}'s mean by {angles} (rms). {angles_judged}",
+        "Forces": " ".join(words for words in (forces, forces_judged, _overload(legs, people, whose)) if words),
         "Energy": f"Cost of transport {_text(metrics['cost_of_transport'], '.3f')}; the ankle gives "
-        f"{_text(work['positive'], '.2f')} J/kg a stride, people's {people['ankle_work_J_kg']['positive']:.2f}. "
-        f"{_judged(metrics, WORKS_LIKE_PEOPLE, judged)}",
+        f"{_text(work['positive'], '.2f')} J/kg a stride, {whose}'s {people['ankle_work_J_kg']['positive']:.2f}. "
+        f"{energy_judged}",
     }
+
+
+def _followed(settings: BipedSettings) -> str:
+    """Return whose walk the body follows, in words."""
+    if settings.guide == "plan":
+        return "after its own plan alone"
+    return "after people's mean walk" if settings.human is None else "fitted to an own person"
+
+
+OVERLOAD = 1.25
+"""Largest vertical force over people's from which on the report says so; chosen, a quarter more."""
+
+
+def _overload(legs: Mapping[str, Mapping[str, Any]], people: Mapping[str, Any], whose: str) -> str:
+    """Return a sentence on the largest vertical force of each foot, beside that of people."""
+    usual = max(people["grf"]["vertical_peak1_bw"], people["grf"]["vertical_peak2_bw"])
+    largest = {side: leg["vertical_max_mean_bw"] for side, leg in legs.items()}
+    over = {side: value for side, value in largest.items() if value is not None and value > OVERLOAD * usual}
+    if not over:
+        return f"Neither foot bears more than a quarter above {whose}'s {usual:.2f}."
+    feet = " and ".join(f"the {side} foot bears {value:.2f}" for side, value in over.items())
+    return f"Overload: {feet} body weights at its peak, {whose}'s {usual:.2f}."
 
 
 _PEAKS = ("vertical_peak1_bw", "vertical_valley_bw", "vertical_peak2_bw")
 """Numbers of the vertical force in `grf` of metrics.json: two peaks and the valley between them."""
 
 
-def _judged(metrics: Mapping[str, Any], criteria: Sequence[Criterion], judged: bool) -> str:
-    """Return a sentence that names those of `criteria` that a walk misses.
-
-    Unless the walk is `judged`, the sentence says that there is no verdict. `metrics` is the content of metrics.json.
-    """
-    if not judged:
-        return f"No verdict: the criteria are for {JUDGED_SPEED:g} m/s and people."
+def _judged(metrics: Mapping[str, Any], criteria: Sequence[Criterion]) -> str:
+    """Return a sentence that names those of `criteria` that a walk misses; `metrics` is the content of metrics.json."""
     values = with_derived(dict(metrics))
     missed = [
         f"{criterion.label or criterion.name} {missed_text(criterion, values)}"

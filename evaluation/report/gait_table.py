@@ -1,6 +1,6 @@
 """Print the table of an evaluation in the terminal: the walk's numbers beside people's, readable in 60 columns."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -257,37 +257,68 @@ def leg_rows(metrics: dict[str, Any]) -> list[tuple[str, str, str, str]]:
     """
     if metrics["per_leg"] is None:
         return []
-    legs = metrics["per_leg"].values()
     settings = settings_from(**metrics["environment"])
-
-    def row(label: str, unit: str, values: Iterable[float | None], pattern: str) -> tuple[str, str, str, str]:
-        """Return a row with the two legs' `values` as text."""
-        left, right = (text_of(value, pattern) for value in values)
-        return label, unit, left, right
-
-    # Label, unit, key of the number in `per_leg`, format.
-    of_leg = (
-        ("step length", "m", "step_length_m", ".3f"),
-        ("stance", "%", "stance_percent", ".1f"),
-        ("vertical force, peak 1", "BW", "vertical_peak1_bw", ".2f"),
-        ("vertical force, peak 2", "BW", "vertical_peak2_bw", ".2f"),
-        ("forward force", "BW", "forward_peak_bw", ".2f"),
-    )
-    rows = [row(label, unit, (leg[key] for leg in legs), pattern) for label, unit, key, pattern in of_leg]
-    for joint in ("knee", "ankle", "toe"):
-        rows.append(row(f"{joint} range", "deg", (leg["joint_range_deg"][joint] for leg in legs), ".1f"))
-    for joint in ("hip", "knee", "ankle", "toe"):
-        work = (leg["joint_work_J_kg"][joint]["positive"] for leg in legs)
-        rows.append(row(f"{joint} work, positive", "J/kg", work, ".2f"))
-    for joint in ("ankle", "toe"):
-        locked = [getattr(foot, joint).is_locked for foot in settings.feet]
-        for part in ("loading", "mid_stance", "push_off", "swing"):
-            stiffness = (text_of(leg["stiffness_Nm_rad"][joint][part], ".0f") for leg in legs)
-            left, right = (LOCKED if lock else text for lock, text in zip(locked, stiffness, strict=True))
-            rows.append((f"{joint} stiffness, {part.replace('_', '-')}", "N·m/rad", left, right))
+    rows = [
+        (row.label, row.unit, row.text(row.left), row.text(row.right))
+        for row in leg_numbers_beside_people(metrics["per_leg"], settings)
+    ]
     deciding = deciding_legs(settings)
     left, right = ("policy" if side in deciding else "device" for side in (LEFT, RIGHT))
     return [*rows, ("stiffness is set by", "", left, right)]
+
+
+class LegRow(NamedTuple):
+    """Numbers of a quantity: of the left and the right leg, and of people; None for an unknown one."""
+
+    label: str
+    unit: str
+    pattern: str
+    """Format of the numbers."""
+    left: float | str | None
+    """Number of the left leg, or a word in its place, as for a locked joint."""
+    right: float | str | None
+    people: float | None
+
+    def text(self, value: float | str | None) -> str:
+        """Return one of the row's values as text."""
+        return value if isinstance(value, str) else text_of(value, self.pattern)
+
+
+def leg_numbers_beside_people(legs: Mapping[str, Mapping[str, Any]], settings: BipedSettings) -> list[LegRow]:
+    """Return the numbers of both legs, `per_leg` of metrics.json, beside those of people or own data."""
+    people = people_metrics(settings)
+    human = reference_gait(settings)
+
+    def row(label: str, unit: str, pattern: str, keys: Sequence[str], of_people: float | None = None) -> LegRow:
+        """Return the row of the number that lies under `keys` in a leg."""
+        values = []
+        for leg in legs.values():
+            value: Any = leg
+            for key in keys:
+                value = value[key]
+            values.append(value)
+        return LegRow(label, unit, pattern, *values, of_people)
+
+    rows = [
+        row("step length", "m", ".3f", ("step_length_m",), people["step_length_m"]),
+        row("stance", "%", ".1f", ("stance_percent",), people["toe_off_percent"]),
+        row("vertical force, peak 1", "BW", ".2f", ("vertical_peak1_bw",), people["grf"]["vertical_peak1_bw"]),
+        row("vertical force, peak 2", "BW", ".2f", ("vertical_peak2_bw",), people["grf"]["vertical_peak2_bw"]),
+        row("forward force", "BW", ".2f", ("forward_peak_bw",), people["grf"]["forward_peak_bw"]),
+    ]
+    for joint in ("knee", "ankle", "toe"):
+        of_people = float(np.degrees(np.ptp(human.mean(joint, PERCENT / 100))))
+        rows.append(row(f"{joint} range", "deg", ".1f", ("joint_range_deg", joint), of_people))
+    for joint in ("hip", "knee", "ankle", "toe"):
+        of_people = people["joint_work_J_kg"].get(joint, {}).get("positive")
+        rows.append(row(f"{joint} work, positive", "J/kg", ".2f", ("joint_work_J_kg", joint, "positive"), of_people))
+    for joint in ("ankle", "toe"):
+        locked = [getattr(foot, joint).is_locked for foot in settings.feet]
+        for part in ("loading", "mid_stance", "push_off", "swing"):
+            stiffness = [leg["stiffness_Nm_rad"][joint][part] for leg in legs.values()]
+            values = (LOCKED if lock else number for lock, number in zip(locked, stiffness, strict=True))
+            rows.append(LegRow(f"{joint} stiffness, {part.replace('_', '-')}", "N·m/rad", ".0f", *values, None))
+    return rows
 
 
 def table_rows(metrics: dict[str, Any]) -> list["TableRow"]:

@@ -1,5 +1,8 @@
 """report.html in a real browser, Debian's Chromium by Playwright, from file://, as wide as a desk's and a phone's."""
 
+import csv
+
+import imageio.v3 as iio
 import pytest
 
 from springfoot.evaluation.numbers.metrics import measure
@@ -63,7 +66,7 @@ def test_in_a_browser_nothing_fails_is_loaded_or_cut_off_and_all_follows_the_scr
         return [each.get_attribute("data-frame") for each in walkers.all()], cursors.first.get_attribute("data-percent")
 
     (begin, _), first = at()
-    for title in ("CoM height", "Left ankle, stiffness K"):  # where the stride begins, so do step and leg
+    for title in ("CoM height", "Ankle, stiffness K"):  # where the stride begins, so do step and leg
         assert float(tab.locator(f"svg[aria-label^='{title}'] .cursor").get_attribute("data-percent")) < 3.0
     tab.keyboard.press("ArrowRight")
     (after, _), second = at()
@@ -107,14 +110,53 @@ def test_axe_finds_no_fault(chromium, page, width, scheme):
     assert [(fault["id"], fault["impact"]) for fault in faults] == []
 
 
-def test_the_first_screen_has_the_verdict_and_the_body(chromium, page, tmp_path):
+@pytest.mark.parametrize(("width", "height"), [(1280, 900), (390, 844)])
+def test_the_first_screen_has_the_walker_its_falls_and_curves(chromium, page, tmp_path, width, height):
     write_page(tmp_path / "report.html", [walked("schedule")])
-    for path, width in ((page, 1280), (tmp_path / "report.html", 1280), (tmp_path / "report.html", 390)):
+    for path in (tmp_path / "report.html", *([page] if width > 1000 else [])):
         tab, _, _ = opened(chromium, path, width)
-        bodies = [each.bounding_box() for each in tab.locator("svg[data-frame]").all()]
         falls = tab.get_by_text("Never fell").or_(tab.get_by_text("Fell in")).first.bounding_box()
-        assert all(body["y"] < 700 for body in bodies) and falls["y"] < 800
+        body = tab.locator("svg[data-frame]").first.bounding_box()
+        curve = tab.locator("svg[aria-label^='Thigh angle']").bounding_box()
+        assert falls["y"] < 200 and body["y"] < 400 and curve["y"] + 0.9 * curve["height"] < height
         tab.close()
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [1280, 390])
+def test_pointing_at_a_curve_reads_it(chromium, page, width, scheme):
+    tab, told, _ = opened(chromium, page, width, color_scheme=scheme)
+    panel = tab.locator("svg[aria-label^='Knee angle']")
+    panel.scroll_into_view_if_needed()
+    before = panel.locator(".value").text_content()
+    box = panel.bounding_box()
+    left, right = (edge * box["width"] / 340 for edge in (58, 330))  # of the axis, as `frame` draws it
+    panel.hover(position={"x": left + 0.72 * (right - left), "y": box["height"] / 2})
+    read = panel.locator(".value").text_content()
+    knee = tab.evaluate("policies[0].panels.find(p => p.title === 'Knee angle').mean[72]")
+    assert read.startswith("72 %: ") and f"{knee:.3g}" in read and "people" in read
+    tab.mouse.move(1, 1)
+    assert panel.locator(".value").text_content() == before and told == []
+    tab.close()
+
+
+def test_a_drawing_is_saved_as_a_picture_and_as_numbers(chromium, page, tmp_path):
+    tab, told, asked = opened(chromium, page, 1280)
+    with tab.expect_download() as picture:
+        tab.get_by_label("PNG of Knee angle").click()
+    assert picture.value.suggested_filename == "Knee_angle.png"
+    picture.value.save_as(tmp_path / "knee.png")
+    pixels = iio.imread(tmp_path / "knee.png")
+    assert pixels.shape[:2] == (430, 680) and pixels.std() > 10  # twice the drawing, and not one colour
+    with tab.expect_download() as numbers:
+        tab.get_by_label("CSV of Knee angle").click()
+    numbers.value.save_as(tmp_path / "knee.csv")
+    head, *rows = list(csv.reader((tmp_path / "knee.csv").read_text(encoding="utf-8").splitlines()))
+    assert head[:3] == ["percent", "schedule mean", "schedule sd"] and head[-2:] == ["people mean", "people sd"]
+    mean = tab.evaluate("policies[0].panels.find(p => p.title === 'Knee angle').mean")
+    assert [float(row[1]) for row in rows] == pytest.approx(mean)
+    assert told == [] and [address for address in asked if not address.startswith("data:")] == [page.as_uri()]
+    tab.close()
 
 
 def test_feet_are_drawn_by_what_they_are(chromium, page):

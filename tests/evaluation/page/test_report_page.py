@@ -13,6 +13,7 @@ from springfoot.envs.settings.feet import foot_setting
 from springfoot.envs.settings.settings import reference_gait, settings_from
 from springfoot.envs.task.reward import TERMS
 from springfoot.evaluation.numbers.metrics import measure
+from springfoot.evaluation.numbers.per_leg import leg_numbers
 from springfoot.evaluation.page.page_figure import foot_words, walker_words
 from springfoot.evaluation.page.report_page import spoken_verdict, write_page
 from springfoot.evaluation.recording.policies import policy_and_settings
@@ -95,7 +96,7 @@ def test_its_curves_are_the_walks_and_peoples(page, walk):
     assert "people" not in panels["Toe moment"]  # of which nobody knows
     assert all(panel["unit"] for panel in panels.values())
     held = {panel["title"]: panel for panel in Reader(page.read_text(encoding="utf-8")).data["policies"][1]["panels"]}
-    assert held["Left toe, stiffness K"]["mean"] == pytest.approx([40.0] * 101, rel=1e-3)
+    assert [leg["mean"] for leg in held["Toe, stiffness K"]["legs"]] == [pytest.approx([40.0] * 101, rel=1e-3)] * 2
 
 
 def test_its_figure_is_two_strides_from_a_left_heel_strike(page, walk):
@@ -152,7 +153,11 @@ def test_feet_of_other_kinds_are_told_drawn_and_measured_apart(tmp_path):
         gait.feet[1].mean("ankle_dorsiflexion_deg"), rel=1e-3, abs=1e-3
     )
     rows = {row[0]: row for row in data["legs"][0]}
-    assert rows["stance"][2:] == ([f"{leg['stance_percent']:.1f}" for leg in gait.metrics["per_leg"].values()])
+    left_stance, right_stance = (leg["stance_percent"] for leg in gait.metrics["per_leg"].values())
+    human = reference_gait(recording.settings)
+    numbers = [f"{left_stance:.1f}", f"{right_stance:.1f}", f"{right_stance - left_stance:+.1f}"]
+    assert rows["stance"][2:] == [*numbers, f"{100 * human.toe_off:.1f}"]
+    assert rows["ankle stiffness, swing"][-1] == "–"  # which nobody has measured
 
 
 @pytest.mark.parametrize(
@@ -187,16 +192,33 @@ def test_a_walker_in_words(settings, words):
 
 
 def test_the_verdict_is_told_in_words(walk):
-    said = spoken_verdict(walk[1].metrics)
+    said = spoken_verdict(walk[1].metrics, leg_numbers(walk[1].tally))
     assert list(said) == ["Falls", "Walker", "Speed", "Joints", "Forces", "Energy"]
-    assert said["Walker"] == "1.7 m, 63 kg, both feet intact."
+    assert said["Walker"] == "1.7 m, 63 kg, both feet intact, 1.2 m/s, after people's mean walk."
     assert said["Falls"].startswith("Never fell in 2 episodes") and "asked for 1.20" in said["Speed"]
     assert re.search(r"Misses \d of 14 criteria|Meets all 14 criteria", said["Joints"])
     missed = [int(count) for text in said.values() for count in re.findall(r"Misses (\d+) of", text)]
     limits = [limit for text in said.values() for limit in re.findall(r"\d\S*(?: \S+)?, asked ([≤≥-]? ?\d)", text)]
     assert sum(missed) == len(limits) > 0
-    faster = walked("schedule", speed=1.4)[1].metrics
-    assert "No verdict: the criteria are for 1.2 m/s" in spoken_verdict(faster)["Joints"]
+
+
+def test_a_walk_at_another_speed_is_held_against_people_at_that_speed():
+    _, gait = walked("schedule", speed=1.4)
+    said = spoken_verdict(gait.metrics, leg_numbers(gait.tally))
+    assert "criteria" not in " ".join(said.values())
+    inside = gait.metrics["joints"]["knee"]["within_1sd_percent"]
+    assert "Inside people's mean ± SD: thigh" in said["Joints"] and f"knee {inside:.0f} %" in said["Joints"]
+    assert "Neither foot bears more than a quarter above people's" in said["Forces"]
+    assert f"Fibre work {gait.metrics['effort']['fibre_J_kg_m']:.2f} J/kg/m, people's" in said["Energy"]
+
+
+def test_a_foot_that_bears_too_much_is_named_at_any_speed(walk):
+    gait = walk[1]
+    legs = {side: {"vertical_max_mean_bw": value} for side, value in (("left", 2.3), ("right", 1.1))}
+    for speed in (1.2, 0.9):
+        metrics = gait.metrics | {"environment": gait.metrics["environment"] | {"speed": speed}}
+        forces = spoken_verdict(metrics, legs)["Forces"]
+        assert "Overload: the left foot bears 2.30 body weights at its peak, people's 1." in forces
 
 
 def test_a_walk_that_only_falls_has_a_page_too(tmp_path):
