@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from .effort import effort_numbers, mean_effort, stiffness_charge
     from .metrics import MOMENT_CURVES, Gait, measure
     from .per_leg import asymmetry, leg_numbers
-    from .series import foot_contacts, strides_within
+    from .series import foot_contacts, mean_speed, strides_within
     from .tally import StrideTally, add_episode
 
 __all__ = [
@@ -26,6 +26,7 @@ __all__ = [
     "foot_contacts",
     "leg_numbers",
     "mean_effort",
+    "mean_speed",
     "measure",
     "number_text",
     "stiffness_charge",
@@ -51,6 +52,7 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
             "leg_numbers": "per_leg",
             "effort_numbers": "effort",
             "mean_effort": "effort",
+            "mean_speed": "series",
             "measure": "metrics",
             "number_text": "criteria",
             "with_derived": "criteria",

@@ -47,6 +47,16 @@ def foot_contacts(vertical: NDArray, body: Body) -> list[Contacts]:
     return [find_contacts(vertical[:, side], TICK, threshold, first=TICK / 2) for side in range(len(SIDES))]
 
 
+def mean_speed(com: NDArray, first: int, last: int) -> float:
+    """Return the mean forward speed of the CoM (T, 2) in the ticks from `first` up to `last` [m/s]."""
+    return distance_walked(com, first, last) / ((last - first) * TICK)
+
+
+def distance_walked(com: NDArray, first: int, last: int) -> float:
+    """Return the forward distance of the CoM (T, 2) in the ticks from `first`, 1 or later, up to `last` [m]."""
+    return float(com[last - 1, 0] - com[first - 1, 0])
+
+
 def strides_within(foot: Contacts, steady: tuple[float, float]) -> NDArray:
     """Return (S, 3) heel strike, toe-off and next heel strike [s] of a foot's complete strides in the time `steady`,
     from and to [s]."""

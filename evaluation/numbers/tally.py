@@ -22,7 +22,15 @@ from springfoot.gait.plan.effort import AS_IS, Muscle
 from ..recording.recording import REWARD, TICK, WARM_UP, Recording
 from .curves import StrideCurves
 from .effort import EpisodeEffort, episode_effort
-from .series import GAIT_CYCLE_COLUMNS, foot_contacts, mid_tick, stride_curves, strides_within
+from .series import (
+    GAIT_CYCLE_COLUMNS,
+    distance_walked,
+    foot_contacts,
+    mean_speed,
+    mid_tick,
+    stride_curves,
+    strides_within,
+)
 
 SHORTEST_SPEED = 1.0
 """Least time after the warm-up for which the speed of an episode counts [s]."""
@@ -130,12 +138,10 @@ def add_episode(
     # Distance, work and speed of the whole steady span, by ticks.
     first_tick, last_tick = (round(min(time / TICK, len(com))) for time in steady)
     if last_tick > first_tick:
-        distance = com[last_tick - 1, 0] - com[first_tick - 1, 0]
-        seconds = (last_tick - first_tick) * TICK
-        tally.distance += distance
+        tally.distance += distance_walked(com, first_tick, last_tick)
         tally.work += float(series["joint_work"][first_tick:last_tick, ..., 0].sum())  # 0: the positive part
-        if seconds >= SHORTEST_SPEED:
-            tally.speed.append(distance / seconds)
+        if (last_tick - first_tick) * TICK >= SHORTEST_SPEED:
+            tally.speed.append(mean_speed(com, first_tick, last_tick))
         if effort := episode_effort(series, body, settings.feet, first_tick, last_tick, muscle):
             tally.effort.append(effort)
 

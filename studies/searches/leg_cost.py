@@ -23,7 +23,7 @@ from springfoot.evaluation.numbers import StrideTally
 from springfoot.evaluation.recording import planned_course
 from springfoot.gait.people import PERCENT, HumanGait, force_features, stride_work
 
-from .leg_walks import FOREIGN, Walks, foreign_springs, mean_speed, measured, walk
+from .leg_walks import FOREIGN, Walks, foreign_springs, measured, walk
 from .walk_effort import effort_price
 
 Pays = Literal["likeness", "effort"]
@@ -234,7 +234,7 @@ def misses(tally: StrideTally, biped: Biped) -> NDArray:
     late = phase > LATE_SWING
     late_hip_moment = mean["hip_moment"][late] - target_mean["hip_moment"][late].max()
     off["late_hip_moment"] = np.maximum(late_hip_moment - ALLOWED["late_hip_moment"], 0.0)
-    off["speed"] = mean_speed(tally) - biped.settings.speed
+    off["speed"] = np.mean(tally.speed) - biped.settings.speed
     off["period"] = np.mean(tally.stride_time) / biped.plan.stride_time - 1
     off["double_support"] = np.mean(tally.double_support) - (target.toe_off - 0.5) * target.stride_time
     features = astuple(force_features(mean["grf_vertical"], mean["grf_forward"]))

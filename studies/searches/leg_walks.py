@@ -143,11 +143,6 @@ def measured(series: dict[str, NDArray], biped: Biped, settled: float = SETTLED)
     return tally if walked else None
 
 
-def mean_speed(tally: StrideTally) -> float:
-    """Return the mean forward speed of the CoM over whole steps [m/s]."""
-    return float(tally.com.mean("vx")[:-1].mean())  # at 100 % the next step has begun
-
-
 def _eased_rest_angles(settings: BipedSettings, candidates: Sequence[LegConstants], ease: float) -> NDArray:
     """Return (C, SAMPLES, 2) rest angles of ankle and toe [rad], moved by the fraction `ease` to the planned ones."""
     walk = reference_walk_at(settings, settings.speed, candidates)

@@ -15,7 +15,7 @@ from springfoot.gait.body import GRAVITY
 from springfoot.gait.people import on_percent
 from springfoot.gait.plan import ACTIVATION_TIME, PER_DEGREE, Effort
 
-from .leg_walks import SETTLED, mean_speed
+from .leg_walks import SETTLED
 
 PER_EFFORT = 10.0
 """Cost of one unit of effort and impact; chosen, so that every walk costs less than a fall."""
@@ -59,7 +59,6 @@ def effort_and_impact(
     """
     body = biped.body
     weight = body.mass * GRAVITY
-    speed = mean_speed(tally)
     ahead = series["com"][:, 0] - series["com_reference"][:, 0]  # of the CoM, forward of the plan's [m]
     impacts: list[float] = []
     places: list[float] = []
@@ -78,7 +77,7 @@ def effort_and_impact(
     effort = mean_effort(tally.effort, body)
     assert effort is not None  # `measured` lets no such walk pass
     task_errors = {
-        "speed": speed - biped.settings.speed,
+        "speed": float(np.mean(tally.speed)) - biped.settings.speed,
         "period": float(np.mean(tally.stride_time)) / biped.plan.stride_time - 1,
         "place": float(np.mean(places)),
         "skipped": (1.0 - float(np.mean(landings))) * 2 * biped.plan.step_length,

@@ -73,17 +73,28 @@ def test_legs_like_peoples_pay_less_than_legs_farther_off_and_those_less_than_le
 
 
 def test_searches_and_studies_measure_as_an_evaluation_does(monkeypatch):
-    """A measurer that finds heel strikes late and toe-offs early moves an evaluation, a search and a study alike."""
+    """A measurer that finds heel strikes late and toe-offs early moves an evaluation, a search and a study alike; one
+    that finds the speed too high, an evaluation and a search."""
     settings = BipedSettings(episode_seconds=SECONDS + 1)
     policy, walked = policy_and_settings("schedule", {"episode_seconds": SECONDS})
 
+    recording = record(policy, walked, name="", episodes=1)
+
+    def paid_by_search():
+        return leg_cost.cost(settings, [COMMITTED], seed=0, threads=1, push=0.0, foreign=0.0)[0]
+
     def three():
-        paid = leg_cost.cost(settings, [COMMITTED], seed=0, threads=1, push=0.0, foreign=0.0)
-        toe_off = measure(record(policy, walked, name="", episodes=1)).metrics["toe_off_percent"]
+        toe_off = measure(recording).metrics["toe_off_percent"]
         step_length = paired_walks(policy, walked, 0.0, range(2), strides=2).unchanged[..., 1]
-        return paid[0], toe_off, step_length
+        return paid_by_search(), toe_off, step_length
 
     paid, toe_off, step_length = three()
+    speed = measure(recording).metrics["speed_m_s"]["mean"]
+    distance = numbers_series.distance_walked
+    with monkeypatch.context() as faster:
+        faster.setattr(numbers_series, "distance_walked", lambda *walk: 1.1 * distance(*walk))
+        assert measure(recording).metrics["speed_m_s"]["mean"] == pytest.approx(1.1 * speed)
+        assert paid_by_search() > paid + 0.1
     found = numbers_series.find_contacts
 
     def late(force, tick, threshold, first=0.0):
