@@ -295,6 +295,14 @@ class Episodes:
             length=length,
         )
 
+    @classmethod
+    def of_length(cls, settings: BipedSettings, count: int) -> "Episodes":
+        """Return room for `count` episodes of the settings' length. Raises as `require_recordable`."""
+        require_recordable(settings, count)
+        step = settings.step_seconds
+        steps = ceil(round(settings.episode_seconds / step, 6))  # rounded first: 2.0000000001 steps are 2
+        return cls.empty(count, round(step / TICK) * steps)
+
     def of(self, rows: slice) -> dict[str, Any]:
         """Return the fields of a `Recording` that belong to episodes, for the episodes `rows`."""
         return {
@@ -377,10 +385,7 @@ def record_all(
         threads, model, legs, progress: as in `record`.
         feet: (E,) feet of each episode; None for those of the settings.
     """
-    require_recordable(settings, len(seeds))
-    step = settings.step_seconds
-    steps = ceil(round(settings.episode_seconds / step, 6))  # rounded first: 2.0000000001 steps are 2
-    kept = Episodes.empty(len(seeds), round(step / TICK) * steps)
+    kept = Episodes.of_length(settings, len(seeds))
     for first in range(0, len(seeds), BATCH):
         rows = slice(first, min(first + BATCH, len(seeds)))
         count = rows.stop - first

@@ -17,11 +17,10 @@ from springfoot.agents.policies import PolicyFunction
 from springfoot.agents.training import PRESETS
 from springfoot.arrays import NDArray
 from springfoot.envs import Biped, BipedSettings
-from springfoot.envs.batch import walked_steps
 from springfoot.envs.physics import Feet
 from springfoot.errors import SpringfootError, require_count
-from springfoot.evaluation.numbers import measure
-from springfoot.evaluation.recording import policy_and_settings, record
+from springfoot.evaluation.numbers import mean_speed, measure
+from springfoot.evaluation.recording import TICK, Episodes, policy_and_settings, record, record_walk
 from springfoot.files.markdown import MISSING, table, text_of
 from springfoot.files.writing import csv_text
 
@@ -40,7 +39,7 @@ SLOPES_DEG = (-5.0, 5.0)
 PEAKS = ("vertical_peak1_bw", "vertical_peak2_bw")
 """Peaks of the mean vertical force."""
 _BATCH = 100
-"""Drawn episodes side by side; chosen."""
+"""Drawn episodes side by side; chosen: a batch takes seconds to make."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,23 +75,24 @@ def walk_drawn(
         biped.reset(np.arange(count), [FIRST_SEED + first + index for index in range(count)])
         feet = [feet_in_words(pair) for pair in biped.feet]
         speed = biped.subjects.speed.copy()
-        way = np.zeros(count)
-        steps = np.zeros(count)
-        fell = np.zeros(count, bool)
-        time = 0.0
-        for active, result in walked_steps(biped, act):
-            time += biped.dt
-            if time > SETTLED_SECONDS:
-                way[active] += result.info["speed"][active]
-                steps[active] += 1
-            fell |= active & result.terminated
-            progress(float(active.sum()) * biped.dt)
-        mean = np.divide(way, steps, out=np.full(count, np.nan), where=steps > 0)
+        recorded = Episodes.of_length(settings, count)
+        record_walk(biped, act, recorded, progress=progress)
         walked += [
-            DrawnEpisode(foot=foot, speed=float(asked), walked=float(kept), fell=bool(down))
-            for foot, asked, kept, down in zip(feet, speed, mean, fell, strict=True)
+            DrawnEpisode(
+                foot=foot,
+                speed=float(speed[index]),
+                walked=_settled_speed(recorded.episode(index)["com"]),
+                fell=bool(recorded.fall_reason[index]),
+            )
+            for index, foot in enumerate(feet)
         ]
     return walked
+
+
+def _settled_speed(com: NDArray) -> float:
+    """Return the evaluation's mean speed of the CoM (T, 2) after `SETTLED_SECONDS` [m/s]; NaN for a shorter walk."""
+    settled = round(SETTLED_SECONDS / TICK)
+    return mean_speed(com, settled, len(com)) if len(com) > settled else np.nan
 
 
 def speed_errors(episodes: Sequence[DrawnEpisode]) -> NDArray:

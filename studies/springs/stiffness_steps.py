@@ -231,7 +231,11 @@ class _Series(NamedTuple):
 
 
 class _Record:
-    """Record of the walks at every tick of 10 ms; the first S walks are unchanged."""
+    """Record of the walks at every tick of 10 ms; the first S walks are unchanged.
+
+    It is no `record_walk`: all series of 25 walks for each seed would fill the memory, and changes are sampled at
+    ticks, which `record_walk` keeps to itself.
+    """
 
     def __init__(self, biped: Biped, change: float, num: int):
         self.stride = np.full(num, -1)
