@@ -10,12 +10,12 @@ import tyro
 from springfoot.command_line import exit_code, parse
 from springfoot.envs.settings.settings import BipedSettings
 from springfoot.errors import MOST_COUNT, require_count, require_number
-from springfoot.evaluation.live.steered_walk import ELSEWHERE, LiveSession
+from springfoot.evaluation.live.refused import REFUSED
 from springfoot.studies.base.flags import EVALUATED, given, optional_flags
 
 MOST_PORT = 65535
 """Largest number of a port."""
-LiveSettings = optional_flags("LiveSettings", BipedSettings, BipedSettings(), themes=EVALUATED, refused=ELSEWHERE)
+LiveSettings = optional_flags("LiveSettings", BipedSettings, BipedSettings(), themes=EVALUATED, refused=REFUSED)
 """Every environment setting as an optional flag; the help of refused ones says so."""
 
 
@@ -55,8 +55,10 @@ def run_live(flags: LiveFlags) -> None:
         require_number("seconds", flags.seconds, 0.0, unit="s", above=True)
     if sys.stderr.isatty():
         print("starting…", file=sys.stderr, flush=True)
+    # Not above: help and bad flags need wait neither for the simulator nor for viser.
     from springfoot.compiling import tell_of_compiling
-    from springfoot.evaluation.live.view import LiveView  # not above: bad flags need not wait for viser
+    from springfoot.evaluation.live.steered_walk import LiveSession
+    from springfoot.evaluation.live.view import LiveView
 
     tell_of_compiling()
     view = LiveView(LiveSession(flags.policy, given(flags.environment), flags.seed), flags.host, flags.port)

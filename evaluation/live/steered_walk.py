@@ -30,6 +30,7 @@ from springfoot.gait.springs.stiffness import SPRINGS
 
 from ..recording.policies import policy_and_settings
 from .foot_entries import PlainFoot, entry_of, with_entry
+from .refused import PUSH_SECONDS, REFUSED
 
 Source = Literal["policy", "scaled", "by hand"]
 """Source of K: the policy, the policy times a factor, or a number that the user sets."""
@@ -42,22 +43,8 @@ LIVE_FACTORS = (0.25, 4.0)
 """Factors on the policy's K [-]; chosen."""
 OFFSETS_DEG = (-15.0, 15.0)
 """Offsets of theta_eq [deg]; chosen, larger than the ankle's motion in stance."""
-LIVE_PUSHES, PUSH_SECONDS = (-400.0, 400.0), 0.1
-"""Horizontal pushes on the trunk, forward positive [N], and the length of each [s]; chosen."""
-ELSEWHERE = {
-    "push_newton": "the button Push pushes",
-    "push_seconds": f"the button Push pushes for {PUSH_SECONDS:g} s",
-    "push_interval": "the button Push pushes",
-    "episode_seconds": "the walk has no end",
-    "height_range": "the slider height sets it",
-    "mass_range": "the slider mass sets it",
-    "drawn_bodies": "its proportions stay",
-    "drawn_feet": "menus and sliders set the feet",
-    "speed_range": "the slider speed sets it",
-    "speed_interval": "the slider speed sets it",
-    "slope_range_deg": "the slider slope sets it",
-}
-"""Setting that a live walk does not take -> reason."""
+LIVE_PUSHES = (-400.0, 400.0)
+"""Horizontal pushes on the trunk, forward positive [N]; chosen."""
 ENDLESS = sys.maxsize
 """Steps of a walk that only a fall ends."""
 LYING_SECONDS = 1.0
@@ -153,14 +140,14 @@ class LiveSession:
 
     Args:
         policy: any name that `springfoot evaluate` takes.
-        given: initial settings, without those of `ELSEWHERE`. Settings that are also `Wishes` can change later.
+        given: initial settings, without those of `REFUSED`. Settings that are also `Wishes` can change later.
         seed: of the walk.
 
     Raises `SpringfootError` for an unknown policy or a bad setting.
     """
 
     def __init__(self, policy: str, given: dict[str, Any] | None = None, seed: int = 0):
-        for name, instead in ELSEWHERE.items():
+        for name, instead in REFUSED.items():
             if (given or {}).get(name):  # 0 and None ask for nothing
                 raise SpringfootError(f"live takes no {name}: {instead}")
         fixed = {

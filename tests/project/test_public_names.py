@@ -74,7 +74,10 @@ def test_readers_import_from_rooms_only(name, code):
             "from springfoot.agents import TrainingConfig; from springfoot.envs import BipedSettings",
             {"mujoco", "numba"},
         ),
-        ("import springfoot.cli.train, springfoot.cli.evaluate, springfoot.cli.export", {"mujoco", "numba", "torch"}),
+        (
+            "import springfoot.cli.train, springfoot.cli.evaluate, springfoot.cli.export, springfoot.cli.live",
+            {"mujoco", "numba", "torch"},
+        ),
         ("from springfoot.cli.main import STUDIES, study_class; [study_class(name) for name in STUDIES]", {"torch"}),
     ],
 )

@@ -16,7 +16,8 @@ from PIL import Image
 
 from springfoot.cli.live import live_main
 from springfoot.cli.main import main
-from springfoot.evaluation.live.steered_walk import ELSEWHERE, LiveSession
+from springfoot.evaluation.live.refused import REFUSED
+from springfoot.evaluation.live.steered_walk import LiveSession
 
 viser = pytest.importorskip("viser", reason="the extra live")
 
@@ -259,7 +260,7 @@ def test_help_marks_every_flag_that_live_refuses_and_no_other(monkeypatch, capsy
         live_main(["--help"])
     flag, text = r"--[a-z][a-z-]+(?= )", capsys.readouterr().out
     marked = {before for before, word in pairwise(re.findall(rf"{flag}|Refused: ", text)) if word == "Refused: "}
-    assert marked == {f"--{name.replace('_', '-')}" for name in ELSEWHERE}
+    assert marked == {f"--{name.replace('_', '-')}" for name in REFUSED}
 
 
 @pytest.mark.parametrize(
