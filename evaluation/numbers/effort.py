@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import isfinite, nan
 from typing import Any
 
 import numpy as np
@@ -128,6 +129,13 @@ def effort_numbers(episodes: Sequence[EpisodeEffort], body: Body) -> dict[str, A
         "per_joint": {joint: numbers_of(*(part[:, index] for part in parts)) for index, joint in enumerate(JOINTS)},
         "per_leg": {side: numbers_of(*(part[index] for part in parts)) for index, side in enumerate(SIDES)},
     }
+
+
+def cost_of_transport(work: float, mass: float, distance: float) -> float | None:
+    """Return positive joint work [J] of both legs over body weight and distance, dimensionless; None without
+    progress, and for work that is not finite."""
+    cost = work / (mass * GRAVITY * distance) if distance > 0 else nan
+    return float(cost) if isfinite(cost) else None
 
 
 def stiffness_charge(recording: Recording, factor: float = 1.0) -> float:

@@ -23,7 +23,7 @@ from springfoot.gait.plan.effort import AS_IS, Muscle
 from ..recording.open_loop import feedback
 from ..recording.recording import REWARD, TICK, Recording
 from .curves import StrideCurves
-from .effort import effort_numbers
+from .effort import cost_of_transport, effort_numbers
 from .per_leg import ANGLE_COLUMNS, USUAL_TOE_OFF, asymmetry, feet_differ, kinds_of, leg_numbers
 from .tally import StrideTally, tally_strides
 
@@ -171,7 +171,7 @@ def _metrics(recording: Recording, tally: StrideTally) -> dict[str, Any]:
         "energy_J_kg": _energy(tally),
         "springs_J_kg": _springs(tally),
         "zmp": _zmp(recording.plan_zmp, tally),
-        "cost_of_transport": score.cost_of_transport(tally.work, body_of(settings).mass, tally.distance),
+        "cost_of_transport": cost_of_transport(tally.work, body_of(settings).mass, tally.distance),
         "stiffness_Nm_rad": {name: stiffness(name) for name in ("ankle", "toe")},
         "feedback": feedback(recording),
         "per_leg": legs,

@@ -14,8 +14,6 @@ from numpy.typing import ArrayLike
 
 from springfoot.arrays import NDArray
 
-from ..body.body import GRAVITY
-
 FIRST_PEAK_PERCENT = (3, 25)
 """Window of the vertical force's first peak (weight acceptance) [percent of stride]."""
 VALLEY_PERCENT = (15, 45)
@@ -101,12 +99,6 @@ def stride_work(power: NDArray, stride_time: NDArray) -> tuple[NDArray, NDArray]
     negative = np.maximum(-power, 0.0)
     spacing = np.asarray(stride_time) / 100  # from percent to percent [s]
     return np.trapezoid(positive, axis=-1) * spacing, np.trapezoid(negative, axis=-1) * spacing
-
-
-def cost_of_transport(work: float, mass: float, distance: float) -> float | None:
-    """Return positive joint work [J] of both legs over body weight and distance, dimensionless; None without
-    progress."""
-    return _number(work / (mass * GRAVITY * distance)) if distance > 0 else None
 
 
 def phase_means(curve: NDArray, toe_off_percent: float) -> dict[str, float | None]:

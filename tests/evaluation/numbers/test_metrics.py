@@ -9,6 +9,7 @@ from springfoot.envs.physics.contact import BALL_RADIUS, HEEL_RADIUS, TOE_RADIUS
 from springfoot.envs.physics.energy import ledger_entries
 from springfoot.envs.settings.settings import BipedSettings
 from springfoot.envs.task.reward import TERMS
+from springfoot.evaluation.numbers.effort import cost_of_transport
 from springfoot.evaluation.numbers.metrics import measure
 from springfoot.evaluation.numbers.series import GAIT_CYCLE_COLUMNS
 from springfoot.evaluation.numbers.tally import tally_strides
@@ -259,6 +260,11 @@ def test_segment_angles_follow_from_joint_angles(gait):
     assert mean("hip_flexion_deg") == pytest.approx(mean("thigh_flexion_deg") + mean("pelvis_anterior_tilt_deg"))
     assert mean("shank_pitch_deg") == pytest.approx(mean("thigh_flexion_deg") - mean("knee_flexion_deg"))
     assert mean("foot_pitch_deg") == pytest.approx(mean("shank_pitch_deg") + mean("ankle_dorsiflexion_deg"))
+
+
+def test_cost_of_transport_is_work_per_weight_and_distance():
+    assert cost_of_transport(63.0 * GRAVITY * 10.0, 63.0, 10.0) == pytest.approx(1.0)
+    assert cost_of_transport(10.0, 63.0, 0.0) is None
 
 
 def test_cost_of_transport_is_the_positive_work_of_all_joints(gait):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from springfoot.gait import GRAVITY, human_gait
+from springfoot.gait import human_gait
 from springfoot.gait.people import scores as score
 from springfoot.gait.people.gait_events import PERCENT
 
@@ -26,7 +26,6 @@ def test_what_cannot_be_computed_is_none():
     assert score.share_within_sd(missing, WAVE, np.ones(101)) is None
     assert score.largest(missing) == (None, None)
     assert set(score.phase_means(missing, 60.0).values()) == {None}
-    assert score.cost_of_transport(10.0, 63.0, 0.0) is None
     assert score.mean_sd([]) == {"mean": None, "sd": None}
     assert score.mean_sd([2.0]) == {"mean": 2.0, "sd": None}
 
@@ -67,10 +66,6 @@ def test_ankle_work_of_people_is_that_of_their_curves():
     positive, negative = score.stride_work(power[None], np.array([human.stride_time]))
     assert positive[0] - negative[0] == pytest.approx(np.trapezoid(power) / 100 * human.stride_time)
     assert 0.25 < positive[0] < 0.40 and 0.05 < negative[0] < 0.20  # design.md's figures: .35, .12
-
-
-def test_cost_of_transport_is_work_per_weight_and_distance():
-    assert score.cost_of_transport(63.0 * GRAVITY * 10.0, 63.0, 10.0) == pytest.approx(1.0)
 
 
 def test_phase_means_split_at_10_45_percent_and_toe_off():
