@@ -14,7 +14,7 @@ from tqdm import tqdm
 from springfoot.command_line import end_in_order, exit_code, parse
 from springfoot.errors import MOST_COUNT, MOST_THREADS, SpringfootError, printable, require_count
 from springfoot.files.writing import is_taken, whole_folder
-from springfoot.studies.base.flags import SettingsFlags, given
+from springfoot.studies.base.flags import RecordedFlags, given
 
 LONGEST_NAME = 60
 """Most letters of the policies' names in the name of a folder; chosen."""
@@ -57,7 +57,7 @@ class EvaluateFlags:
     extra film."""
     json: bool = False
     """Print, in place of the tables, one JSON object: `folder`, and as `metrics` the content of each metrics.json."""
-    environment: tyro.conf.OmitArgPrefixes[SettingsFlags]  # type: ignore[valid-type]
+    environment: tyro.conf.OmitArgPrefixes[RecordedFlags]  # type: ignore[valid-type]
     """Settings of the environment. Each group says which of them a trained policy brings; all others have the defaults
     shown unless a flag says otherwise, whatever the policy was trained on."""
 

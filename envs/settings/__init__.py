@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from .feet import FOOT_SETTINGS, KINDS, SPRING_NUMBERS, foot_setting
     from .settings import (
         CONDITION_SETTINGS,
+        DRAWN_SETTINGS,
         THEME_OF,
         THEMES,
         BipedSettings,
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "CONDITION_SETTINGS",
+    "DRAWN_SETTINGS",
     "FOOT_SETTINGS",
     "KINDS",
     "LONGEST_EPISODE",
@@ -43,6 +45,7 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
         __name__,
         {
             "CONDITION_SETTINGS": "settings",
+            "DRAWN_SETTINGS": "settings",
             "FOOT_SETTINGS": "feet",
             "KINDS": "feet",
             "LONGEST_EPISODE": "checks",

@@ -11,7 +11,7 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 import tyro
 
 from springfoot.command_line import field_help
-from springfoot.envs.settings import CONDITION_SETTINGS, FOOT_SETTINGS, THEME_OF, THEMES, BipedSettings
+from springfoot.envs.settings import CONDITION_SETTINGS, DRAWN_SETTINGS, FOOT_SETTINGS, THEME_OF, THEMES, BipedSettings
 from springfoot.errors import SpringfootError, quoted
 from springfoot.files.json_file import json_fault, keys_once, read_array, read_object
 from springfoot.gait.people import read_gait
@@ -215,3 +215,11 @@ EVALUATED = {theme: _evaluated(theme) for theme in THEMES}
 """Theme -> its help in an evaluation."""
 SettingsFlags = optional_flags("SettingsFlags", BipedSettings, BipedSettings(), themes=EVALUATED)
 """Every environment setting as an optional flag of an evaluation, in groups by theme (dataclass for `tyro`)."""
+RecordedFlags = optional_flags(
+    "RecordedFlags",
+    BipedSettings,
+    BipedSettings(),
+    themes=EVALUATED,
+    refused=dict.fromkeys(DRAWN_SETTINGS, "an evaluation is of one body at one speed in one world"),
+)
+"""`SettingsFlags` where `record` refuses the settings that draw; their help says so."""

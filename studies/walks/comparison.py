@@ -24,7 +24,7 @@ from springfoot.files.markdown import MISSING, plus_minus, table, text_of
 from springfoot.gait.people import mean_sd
 
 from ..base.columns import OPEN_LOOP, WALK_COLUMNS, falls_text, rmse_text, walks_csv
-from ..base.flags import SettingsFlags, given
+from ..base.flags import RecordedFlags, given
 from ..base.intervals import RESAMPLES, mean_interval, paired_p, share_interval
 from ..base.study import Answer, OnProgress, WalkingStudy
 
@@ -262,7 +262,7 @@ class Compare(WalkingStudy):
     """Also walk every policy on slopes, uneven and slippery ground, with delays, loads and other proportions."""
     episodes: int = 100
     """Episodes of each row."""
-    environment: tyro.conf.OmitArgPrefixes[SettingsFlags]  # type: ignore[valid-type]
+    environment: tyro.conf.OmitArgPrefixes[RecordedFlags]  # type: ignore[valid-type]
     """Environment; a trained policy brings its own settings, standard conditions aside."""
 
     QUICK: ClassVar[dict[str, Any]] = {"episodes": 1, "seconds": 4.0, "pushes": (150.0,), "world": False}

@@ -1,13 +1,11 @@
 """The live walk in a real browser: its sliders and buttons steer the simulation, and nothing else is loaded."""
 
 import asyncio
-import re
 import resource
 import socket
 import threading
 import time
 from io import BytesIO
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +14,6 @@ from PIL import Image
 
 from springfoot.cli.live import live_main
 from springfoot.cli.main import main
-from springfoot.evaluation.live.refused import REFUSED
 from springfoot.evaluation.live.steered_walk import LiveSession
 
 viser = pytest.importorskip("viser", reason="the extra live")
@@ -252,15 +249,6 @@ def test_the_command_says_where_and_ends_in_its_time(capsys):
     said = capsys.readouterr().out.splitlines()
     assert said[0].startswith("Live at http://127.0.0.1:") and said[1].endswith("pictures a second")
     assert len(said) == 2
-
-
-def test_help_marks_every_flag_that_live_refuses_and_no_other(monkeypatch, capsys):
-    monkeypatch.setenv("COLUMNS", "80")
-    with pytest.raises(SystemExit, match=r"^0$"):
-        live_main(["--help"])
-    flag, text = r"--[a-z][a-z-]+(?= )", capsys.readouterr().out
-    marked = {before for before, word in pairwise(re.findall(rf"{flag}|Refused: ", text)) if word == "Refused: "}
-    assert marked == {f"--{name.replace('_', '-')}" for name in REFUSED}
 
 
 @pytest.mark.parametrize(

@@ -2,13 +2,13 @@
 
 import pytest
 
-from springfoot.studies.base.flags import SettingsFlags
+from springfoot.studies.base.flags import RecordedFlags
 from springfoot.studies.springs.any_stiffness import AnyStiffness
 from springfoot.studies.springs.influence import Influence
 from springfoot.studies.walks.comparison import Compare
 
 SHORT = {"episodes": 2, "seconds": 0.4}
-USUAL = SettingsFlags()
+USUAL = RecordedFlags()
 STUDIES = [
     Compare(policies=("schedule", "constant"), springs=False, world=True, environment=USUAL, **SHORT),
     Compare(

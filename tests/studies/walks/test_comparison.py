@@ -15,7 +15,7 @@ from springfoot.evaluation.numbers.metrics import measure
 from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.evaluation.recording.recording import record
 from springfoot.studies.base import columns, intervals
-from springfoot.studies.base.flags import SettingsFlags
+from springfoot.studies.base.flags import RecordedFlags
 from springfoot.studies.walks import comparison
 
 SHORT = {"episode_seconds": 4.5, "push_newton": 150.0}
@@ -181,7 +181,7 @@ def test_studies_run_as_a_command_and_leave_their_numbers(tmp_path):
 def test_elsewhere_every_condition_is_a_row_of_what_evaluate_would_find(monkeypatch):
     monkeypatch.setattr(comparison, "WORLD", ({}, {"slope_deg": 5.0}))
     how = {"springs": False, "pushes": (0.0,), "world": True, "episodes": 1, "seconds": 4.5}
-    study = comparison.Compare(policies=("schedule",), environment=SettingsFlags(), **how)
+    study = comparison.Compare(policies=("schedule",), environment=RecordedFlags(), **how)
     files = study.ask(lambda seconds: None).files
     lines = list(csv.DictReader(files["world.csv"].splitlines()))
     assert [line["conditions"] for line in lines] == ["", "slope_deg 5.0"]
