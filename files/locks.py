@@ -189,7 +189,7 @@ def _owner_in(handle: int) -> dict[str, Any]:
 
 
 def is_marked(folder: Path) -> bool:
-    """Tell whether a folder holds an owner's file as only a process of ours writes it."""
+    """Return whether the folder holds a valid owner file (regular, not linked, all keys)."""
     try:
         handle = os.open(folder / OWNER, os.O_RDONLY | _NO_LINK)
     except OSError:

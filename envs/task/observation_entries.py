@@ -71,7 +71,7 @@ def _entries() -> tuple[Entry, ...]:
 
 
 def _further_entries() -> tuple[Entry, ...]:
-    """Return the entries that a person sees besides, in order: the last offsets, the springs now, the body and feet."""
+    """Return the entries that only a person observes, in order: last offsets, slope, stiffness, feet and body."""
     springs = [(side, joint) for side in SIDES for joint in ("ankle", "toe")]
     return (
         *(Entry(f"last_{name}", "rad", -1.0, 1.0, "offset of the step before", False) for name in PERSON_ACTIONS),
@@ -89,7 +89,7 @@ def _further_entries() -> tuple[Entry, ...]:
 
 
 def _worn_entries(side: str) -> tuple[Entry, ...]:
-    """Return the entries that tell the foot of one side."""
+    """Return the entries of the foot of one side."""
     return (
         Entry(f"muscles_ankle_{side}", "1", 0.0, 1.0, "1 for muscles, 0 for a device in their place", False),
         Entry(f"muscles_toe_{side}", "1", 0.0, 1.0, "likewise", False),

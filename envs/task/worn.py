@@ -1,4 +1,4 @@
-"""Tell a person about body and feet: entries of the observation that change only with them."""
+"""Define the observation entries of body and feet, for learned persons."""
 
 import numpy as np
 

@@ -26,6 +26,10 @@ LEG_SEGMENTS = ("thigh", "shank", "foot", "toe")
 FOOT_SEGMENT = LEG_SEGMENTS.index("foot")
 TOE_SEGMENT = LEG_SEGMENTS.index("toe")
 
+_FOOT_SEGMENTS = 2
+"""Segments of a foot: foot and toe."""
+_IN_PLANE = 2
+"""Components of a vector in the plane: x and z."""
 _MOMENT_SIGN = (-1.0, 1.0, -1.0, -1.0)
 """Internal moment over the turning moment on the segment below, in the order of `JOINTS`."""
 
@@ -47,7 +51,9 @@ class LegMotion:
 
     def __post_init__(self) -> None:
         leading = self.hip.shape[:-1]
-        _require_shapes(self, {"turn": 4, "rate": 4, "acceleration": 4, "hip": 2, "hip_acceleration": 2}, leading)
+        segments = len(LEG_SEGMENTS)
+        of_segments = {"turn": segments, "rate": segments, "acceleration": segments}
+        _require_shapes(self, {**of_segments, "hip": _IN_PLANE, "hip_acceleration": _IN_PLANE}, leading)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -60,7 +66,8 @@ class FootLoad:
     """(..., 2, 2) a point (x, z) [m] of the force's line of action; irrelevant for a force of 0."""
 
     def __post_init__(self) -> None:
-        _require_shapes(self, {"force": 2, "point": 2}, (*self.force.shape[:-2], 2))
+        leading = self.force.shape[:-2]
+        _require_shapes(self, {"force": _IN_PLANE, "point": _IN_PLANE}, (*leading, _FOOT_SEGMENTS))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

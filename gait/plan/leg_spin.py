@@ -71,9 +71,10 @@ def spinning_legs(
 
 
 def pivot_ahead(body: Body, motion: ComMotion, legs: LegPostures, step_length: float, lean: float = 0.0) -> CubicSpline:
-    """Return the pivot's distance ahead of the CoM [m] over the time of a step [s], as the module's head defines it.
+    """Return the distance of the pivot ahead of the CoM [m], as a periodic function of the time in a step [s].
 
-    `legs` are one leg's postures over a stride; the trunk is upright or leans by `lean` [rad].
+    The ground force of a body with swinging legs points to the pivot, not to the CoM (see the module's head). `legs`
+    are one leg's postures over a stride; the trunk is upright or leans by `lean` [rad].
     """
     stride_time = 2 * motion.step_time
     half = POSTURE_SAMPLES // 2
@@ -84,7 +85,8 @@ def pivot_ahead(body: Body, motion: ComMotion, legs: LegPostures, step_length: f
     samples = np.concatenate([segment_turns(angles, motion.slope), hip], -1)
     leg = motion_of(*fourier_jet(samples, PLAN_HARMONICS, phase, stride_time))
     com = np.stack(motion.position(np.mod(2 * phase, 1.0) * motion.step_time), -1)
-    # Over two steps and without its mean progress too: a step further in the second step, less the progress so far.
+    # Subtract the mean forward motion, so that the CoM repeats every stride. `motion` is of one step: the second step
+    # of the stride is a step length ahead.
     com[:, 0] += step_length * ((phase >= 0.5) - 2 * phase)
     # Rate of change of angular momentum about the CoM [N m]: both legs, half a stride apart, and then the trunk.
     one_leg = spin_rate(body, leg, com)
