@@ -25,7 +25,7 @@ from springfoot.envs.settings import BipedSettings
 from springfoot.errors import SpringfootError, require_count
 from springfoot.files.locks import owned
 from springfoot.files.markdown import table
-from springfoot.files.writing import make_folder
+from springfoot.files.writing import make_folder, write_atomically
 
 from ..base.pushed_walks import PushedWalks, kept_metrics
 from ..base.study import Answer, OnProgress, WalkingStudy, without_places
@@ -170,7 +170,7 @@ class Predict(WalkingStudy):
             )
         for name, search in searches.items():
             text = stage(name, lambda search=search: search.ask(progress)).text
-            (self.folder / f"{name}.txt").write_text(f"{text}\n", encoding="utf-8")
+            write_atomically(self.folder / f"{name}.txt", f"{text}\n".encode())
         # The policy's folder is named after plan and constants, so that other constants train another policy.
         constants = read_constants(found)
         digest = hashlib.sha256(json.dumps([constants["styles"], constants["constants"]]).encode()).hexdigest()
