@@ -10,12 +10,12 @@ import tyro
 from springfoot.command_line import exit_code, parse
 from springfoot.envs.settings.settings import BipedSettings
 from springfoot.errors import MOST_COUNT, require_count, require_number
-from springfoot.evaluation.live.refused import REFUSED
+from springfoot.evaluation.live.refused import LIVE_REFUSES
 from springfoot.studies.base.flags import EVALUATED, given, optional_flags
 
 MOST_PORT = 65535
 """Largest number of a port."""
-LiveSettings = optional_flags("LiveSettings", BipedSettings, BipedSettings(), themes=EVALUATED, refused=REFUSED)
+LiveSettings = optional_flags("LiveSettings", BipedSettings, BipedSettings(), themes=EVALUATED, refused=LIVE_REFUSES)
 """Every environment setting as an optional flag; the help of refused ones says so."""
 
 

@@ -2,7 +2,7 @@
 
 PUSH_SECONDS = 0.1
 """Length of each push [s]; chosen."""
-REFUSED = {
+LIVE_REFUSES = {
     "push_newton": "the button Push pushes",
     "push_seconds": f"the button Push pushes for {PUSH_SECONDS:g} s",
     "push_interval": "the button Push pushes",

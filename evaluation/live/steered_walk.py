@@ -30,7 +30,7 @@ from springfoot.gait.springs.stiffness import SPRINGS
 
 from ..recording.policies import policy_and_settings
 from .foot_entries import PlainFoot, entry_of, with_entry
-from .refused import PUSH_SECONDS, REFUSED
+from .refused import LIVE_REFUSES, PUSH_SECONDS
 
 Source = Literal["policy", "scaled", "by hand"]
 """Source of K: the policy, the policy times a factor, or a number that the user sets."""
@@ -140,14 +140,14 @@ class LiveSession:
 
     Args:
         policy: any name that `springfoot evaluate` takes.
-        given: initial settings, without those of `REFUSED`. Settings that are also `Wishes` can change later.
+        given: initial settings, without those of `LIVE_REFUSES`. Settings that are also `Wishes` can change later.
         seed: of the walk.
 
     Raises `SpringfootError` for an unknown policy or a bad setting.
     """
 
     def __init__(self, policy: str, given: dict[str, Any] | None = None, seed: int = 0):
-        for name, instead in REFUSED.items():
+        for name, instead in LIVE_REFUSES.items():
             if (given or {}).get(name):  # 0 and None ask for nothing
                 raise SpringfootError(f"live takes no {name}: {instead}")
         fixed = {
