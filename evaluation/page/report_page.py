@@ -117,7 +117,7 @@ def _verdict(index: int, metrics: dict[str, Any], spoken: Mapping[str, str]) -> 
     )
 
 
-def spoken_verdict(metrics: Mapping[str, Any], legs: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
+def spoken_verdict(metrics: dict[str, Any], legs: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
     """Return the verdict in words: heading -> sentences on falls, walker, faults, speed, joints, forces and energy.
 
     At the speed for which the criteria were chosen they judge the walk. At other speeds, and beside an own person, it

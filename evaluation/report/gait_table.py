@@ -284,6 +284,13 @@ class LegRow(NamedTuple):
         return value if isinstance(value, str) else text_of(value, self.pattern)
 
 
+def _under(numbers: Any, keys: Sequence[str]) -> float | None:
+    """Return the number that lies in nested dictionaries under some keys, one after another."""
+    for key in keys:
+        numbers = numbers[key]
+    return numbers
+
+
 def leg_numbers_beside_people(legs: Mapping[str, Mapping[str, Any]], settings: BipedSettings) -> list[LegRow]:
     """Return the numbers of both legs, `per_leg` of metrics.json, beside those of people or own data."""
     people = people_metrics(settings)
@@ -291,13 +298,8 @@ def leg_numbers_beside_people(legs: Mapping[str, Mapping[str, Any]], settings: B
 
     def row(label: str, unit: str, pattern: str, keys: Sequence[str], of_people: float | None = None) -> LegRow:
         """Return the row of the number that lies under `keys` in a leg."""
-        values = []
-        for leg in legs.values():
-            value: Any = leg
-            for key in keys:
-                value = value[key]
-            values.append(value)
-        return LegRow(label, unit, pattern, *values, of_people)
+        left, right = (_under(leg, keys) for leg in legs.values())
+        return LegRow(label, unit, pattern, left, right, of_people)
 
     rows = [
         row("step length", "m", ".3f", ("step_length_m",), people["step_length_m"]),
@@ -316,8 +318,9 @@ def leg_numbers_beside_people(legs: Mapping[str, Mapping[str, Any]], settings: B
         locked = [getattr(foot, joint).is_locked for foot in settings.feet]
         for part in ("loading", "mid_stance", "push_off", "swing"):
             stiffness = [leg["stiffness_Nm_rad"][joint][part] for leg in legs.values()]
-            values = (LOCKED if lock else number for lock, number in zip(locked, stiffness, strict=True))
-            rows.append(LegRow(f"{joint} stiffness, {part.replace('_', '-')}", "N·m/rad", ".0f", *values, None))
+            left, right = (LOCKED if lock else number for lock, number in zip(locked, stiffness, strict=True))
+            label = f"{joint} stiffness, {part.replace('_', '-')}"
+            rows.append(LegRow(label, "N·m/rad", ".0f", left, right, None))
     return rows
 
 
