@@ -185,8 +185,8 @@ class FootChoice(WalkingStudy):
     def _prices(self, price: str, walks: Sequence[Sequence["_Walk"]]) -> NDArray | None:
         """Return a price (P, E) of each person and episode at the walked speed `self.speed`.
 
-        `walks` are two walks of each person on one foot, at two commanded speeds. None if somebody fell, or cannot
-        change speed.
+        `walks` are two walks of each person on one foot, at two commanded speeds. None if somebody fell, or walks too
+        slowly.
         """
         if any((walk.recording.fall_reason != "").any() for at_speed in walks for walk in at_speed):
             return None

@@ -56,16 +56,20 @@ def price_at(speed: float, walked: NDArray, prices: NDArray) -> NDArray | None:
     """Return the prices (P, E) at a walked `speed` [m/s], on the line through two walks of each person and episode.
 
     Args:
-        speed: that lies between the two walked speeds, or near them.
+        speed: [m/s].
         walked: (2, P, E) speeds of the two walks [m/s].
         prices: (2, P, E) prices of the two walks.
 
-    Returns None where a person's two walks are of nearly one speed.
+    Returns None where a person's two walks are of nearly one speed, or where `speed` is farther from both than they are
+    from each other: a foot can be too slow for it.
     """
     change = walked[1] - walked[0]
     if (np.abs(change) < LEAST_CHANGE).any():
         return None
-    return prices[0] + (prices[1] - prices[0]) * (speed - walked[0]) / change
+    way = (speed - walked[0]) / change  # 0 at the first walk, 1 at the second
+    if ((way < -1.0) | (way > 2.0)).any():
+        return None
+    return prices[0] + (prices[1] - prices[0]) * way
 
 
 def verdict(price: str, names: Sequence[str], prices: Sequence[NDArray | None]) -> str:
@@ -74,11 +78,11 @@ def verdict(price: str, names: Sequence[str], prices: Sequence[NDArray | None]) 
     Args:
         price: name of the price, such as "fibre work".
         names: (F,) of the feet; the first one is that to compare with.
-        prices: (F,) of each foot the prices (P, E) of P persons in E episodes; None where somebody fell.
+        prices: (F,) of each foot the prices (P, E) of P persons in E episodes; None where somebody fell or was too slow.
     """
     walked = {name: values for name, values in zip(names, prices, strict=True) if values is not None}
     if not walked:
-        return f"{price.capitalize()} is unknown: somebody falls on every foot."
+        return f"{price.capitalize()} is unknown: on every foot somebody falls or is too slow."
     least = min(walked, key=lambda name: walked[name].mean())
     against_least = {name: difference(values, walked[least]) for name, values in walked.items() if name != least}
     like_least = [name for name in walked if name == least or not against_least[name].told_apart]
@@ -88,7 +92,7 @@ def verdict(price: str, names: Sequence[str], prices: Sequence[NDArray | None]) 
     if others:
         sentence += f", not told apart from {_list(others)}"
     if first not in walked:
-        sentence += f"; somebody falls with {first}"
+        sentence += f"; unknown with {first}, on which somebody falls or is too slow"
     elif first not in like_least:
         sentence += f": {difference(walked[least], walked[first]).text} against {first}"
     dearer = [f"{name} {_percent(against_least[name].mean)} %" for name in walked if name not in (*like_least, first)]

@@ -41,8 +41,12 @@ def test_the_verdict_names_the_least_its_like_and_the_dearer():
     assert (
         verdict("effort", ["none", "4"], [first, 0.99 * first]) == "Effort is least with 4, not told apart from none."
     )
-    assert verdict("effort", ["none", "4"], [None, first]) == "Effort is least with 4; somebody falls with none."
-    assert verdict("effort", ["none", "4"], [None, None]) == "Effort is unknown: somebody falls on every foot."
+    assert verdict("effort", ["none", "4"], [None, first]) == (
+        "Effort is least with 4; unknown with none, on which somebody falls or is too slow."
+    )
+    assert verdict("effort", ["none", "4"], [None, None]) == (
+        "Effort is unknown: on every foot somebody falls or is too slow."
+    )
 
 
 def test_a_price_at_one_speed_is_on_the_line_of_each_pair_of_walks():
@@ -51,3 +55,4 @@ def test_a_price_at_one_speed_is_on_the_line_of_each_pair_of_walks():
     assert price_at(1.15, walked, prices) == pytest.approx(np.full((1, 2), 3.3))
     assert price_at(1.0, walked, prices) == pytest.approx(np.full((1, 2), 3.0))
     assert price_at(1.15, np.array([[[1.0]], [[1.0 + 0.9 * LEAST_CHANGE]]]), prices[..., :1]) is None
+    assert price_at(1.41, walked, prices) is None and price_at(1.29, walked, prices) is not None  # too slow for it
