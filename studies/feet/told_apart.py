@@ -78,7 +78,7 @@ def verdict(price: str, names: Sequence[str], prices: Sequence[NDArray | None]) 
     Args:
         price: name of the price, such as "fibre work".
         names: (F,) of the feet; the first one is that to compare with.
-        prices: (F,) of each foot the prices (P, E) of P persons in E episodes; None where somebody fell or was too slow.
+        prices: (F,) of each foot the prices (P, E) of P persons in E episodes; None where one fell or was too slow.
     """
     walked = {name: values for name, values in zip(names, prices, strict=True) if values is not None}
     if not walked:

@@ -53,6 +53,6 @@ def test_a_price_at_one_speed_is_on_the_line_of_each_pair_of_walks():
     walked = np.array([[[1.0, 1.1]], [[1.2, 1.2]]])
     prices = 1.0 + 2.0 * walked  # a price that is linear in the speed
     assert price_at(1.15, walked, prices) == pytest.approx(np.full((1, 2), 3.3))
-    assert price_at(1.0, walked, prices) == pytest.approx(np.full((1, 2), 3.0))
+    assert price_at(1.05, walked, prices) == pytest.approx(np.full((1, 2), 3.1))
     assert price_at(1.15, np.array([[[1.0]], [[1.0 + 0.9 * LEAST_CHANGE]]]), prices[..., :1]) is None
     assert price_at(1.41, walked, prices) is None and price_at(1.29, walked, prices) is not None  # too slow for it
