@@ -32,7 +32,7 @@ from ..base.flags import read_foot_flag
 from ..base.study import Answer, OnProgress, WalkingStudy
 from .foot_numbers import numbers_of
 from .orthosis import braced_calf
-from .told_apart import GAP, difference, price_at, verdict
+from .told_apart import GAP, common_speed, difference, price_at, verdict
 from .walked_speeds import TWO_PRICES, Row, rows_csv
 
 MOST_FEET = 8
@@ -40,9 +40,7 @@ MOST_FEET = 8
 SIDES_OF = {"left": ("left_foot",), "right": ("right_foot",), "both": ("left_foot", "right_foot")}
 """Side -> settings of its feet."""
 OTHER_SPEED = 0.1
-"""Difference of the second commanded speed, as a share."""
-FAST = 1.4
-"""Speed from which on the second commanded speed is the slower one; persons have learned up to 1.6 [m/s]."""
+"""How much slower the second walk is asked for, as a share: walks with hindrances are slower than asked for."""
 PRICE_NAMES = dict(zip(TWO_PRICES, ("fibre work", "effort"), strict=True))
 """Column of a price -> its name."""
 CANNOT_SAY = """- It is a body in a plane: nothing here is about comfort, pain, or balance to the side.
@@ -58,11 +56,28 @@ class _Walk:
     recording: Recording
     gait: Gait
 
+    @property
+    def falls(self) -> float:
+        """Return the share of episodes that fall."""
+        return float((self.recording.fall_reason != "").mean())
+
     def prices(self, price: str) -> list[float]:
         """Return a price of each episode."""
         key = {"fibre_J_kg_m": "fibre_J_kg_m", "effort": "total"}[price]
         body = body_of(self.recording.settings)
         return [effort_numbers([episode], body)[key] for episode in self.gait.tally.effort]
+
+
+def _walked(walks: Sequence[Sequence[_Walk]]) -> NDArray | None:
+    """Return the speeds (2, P, E) [m/s] of two walks of P persons; None if somebody fell."""
+    if any(walk.falls for at_speed in walks for walk in at_speed):
+        return None
+    return np.array([[walk.gait.tally.speed for walk in at_speed] for at_speed in walks])
+
+
+def _prices(price: str, walks: Sequence[Sequence[_Walk]]) -> NDArray:
+    """Return a price (2, P, E) of two walks of P persons."""
+    return np.array([[walk.prices(price) for walk in at_speed] for at_speed in walks])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,18 +151,22 @@ class FootChoice(WalkingStudy):
         """Walk on every foot."""
         names = list(self.feet)
         persons = [self._person(name) for name in self.persons]
-        walks, faster, pushed = (
+        walks, slower, pushed = (
             [self._walk(*person, progress, **changed) for person in persons]
             for changed in ({}, {"speed": self._other_speed}, {"push_newton": self.push_newton})
         )
         rows = []
-        for person, own, own_pushed in zip(self.persons, walks, pushed, strict=True):
-            for name, walk, pushed_walk in zip(names, own, own_pushed, strict=True):
-                falls = {"falls_pushed": float((pushed_walk.recording.fall_reason != "").mean())}
+        for person, *own in zip(self.persons, walks, slower, pushed, strict=True):
+            for name, walk, other_walk, pushed_walk in zip(names, *own, strict=True):
+                falls = {"falls_other_speed": other_walk.falls, "falls_pushed": pushed_walk.falls}
                 rows.append({"person": person, "foot": name, **numbers_of(walk.gait, self.side), **falls})
+        pairs = [[[of[index] for of in at] for at in (walks, slower)] for index in range(len(names))]
+        walked = [_walked(pair) for pair in pairs]
+        speed = common_speed(self.speed, walked)
         prices = {
             price: [
-                self._prices(price, [[of[index] for of in at] for at in (walks, faster)]) for index in range(len(names))
+                None if speeds is None else price_at(speed, speeds, _prices(price, pair))
+                for pair, speeds in zip(pairs, walked, strict=True)
             ]
             for price in TWO_PRICES
         }
@@ -157,12 +176,12 @@ class FootChoice(WalkingStudy):
             "feet.png": partial(self._draw, names=names, prices=prices),
             "report.html": partial(write_page, walks=shown, command=self.command),
         }
-        return Answer(text=self._text(names, rows, prices), files=files)
+        return Answer(text=self._text(names, rows, prices, speed), files=files)
 
     @property
     def _other_speed(self) -> float:
-        """Return the second commanded speed [m/s]: faster, but for fast walks slower."""
-        return self.speed * (1.0 + OTHER_SPEED if self.speed < FAST else 1.0 - OTHER_SPEED)
+        """Return the second commanded speed [m/s]."""
+        return self.speed * (1.0 - OTHER_SPEED)
 
     def _person(self, name: str) -> tuple[PolicyFunction, BipedSettings]:
         """Return a person by name, and the settings to walk it with."""
@@ -182,19 +201,13 @@ class FootChoice(WalkingStudy):
         named = [replace(recording, policy=name) for recording, name in zip(recordings, self.feet, strict=True)]
         return [_Walk(recording=recording, gait=measure(recording)) for recording in named]
 
-    def _prices(self, price: str, walks: Sequence[Sequence["_Walk"]]) -> NDArray | None:
-        """Return a price (P, E) of each person and episode at the walked speed `self.speed`.
-
-        `walks` are two walks of each person on one foot, at two commanded speeds. None if somebody fell, or walks too
-        slowly.
-        """
-        if any((walk.recording.fall_reason != "").any() for at_speed in walks for walk in at_speed):
-            return None
-        prices = np.array([[walk.prices(price) for walk in at_speed] for at_speed in walks])
-        walked = np.array([[walk.gait.tally.speed for walk in at_speed] for at_speed in walks])
-        return price_at(self.speed, walked, prices)
-
-    def _text(self, names: Sequence[str], rows: Sequence[Row], prices: Mapping[str, Sequence[NDArray | None]]) -> str:
+    def _text(
+        self,
+        names: Sequence[str],
+        rows: Sequence[Row],
+        prices: Mapping[str, Sequence[NDArray | None]],
+        speed: float,
+    ) -> str:
         """Return the report."""
         verdicts = [verdict(words, names, prices[price]) for price, words in PRICE_NAMES.items()]
         lines = []
@@ -204,35 +217,45 @@ class FootChoice(WalkingStudy):
             lines.append(
                 [
                     name,
-                    f"{_share(here, 'falls')} / {_share(here, 'falls_pushed')}",
+                    " / ".join(_share(here, key) for key in ("falls", "falls_other_speed", "falls_pushed")),
                     _mean(here, "speed_m_s", ".2f"),
                     text_of(None if fibre is None else float(fibre.mean()), ".2f"),
                     *(_change(of_price[index], of_price[0]) if index else MISSING for of_price in prices.values()),
                     *(_mean(here, key, pattern) for key, pattern in _COLUMNS.values()),
                 ]
             )
-        head = ["foot", "falls / pushed", "walked, m/s", "fibre work, J/kg/m", "change", "effort, change", *_COLUMNS]
+        head = [
+            "foot",
+            "falls / other speed / pushed",
+            "walked, m/s",
+            "fibre work, J/kg/m",
+            "change",
+            "effort, change",
+            *_COLUMNS,
+        ]
         return "\n\n".join(
             [
                 f"**{verdicts[0]}** {verdicts[1]}",
                 table(head, lines),
-                self._how(names[0]),
+                self._how(names[0], speed),
                 f"What this cannot say:\n\n{CANNOT_SAY}",
                 "![Price of the walk on each foot](feet.png)",
             ]
         )
 
-    def _how(self, first: str) -> str:
-        """Return the paragraph on how the table was made; changes are against the foot `first`."""
+    def _how(self, first: str, speed: float) -> str:
+        """Return the paragraph on how the table was made: prices at a walked `speed` [m/s], changes against the foot
+        `first`."""
         calf = "" if self.calf is None else f", calves of {self.calf:.0%}"
         worn = "both feet" if self.side == "both" else f"the {self.side} foot"
-        alone = " Of one person, they know nothing of how others learn." if len(self.persons) == 1 else ""
+        intervals = "" if len(self.persons) == 1 else ", with 95 % intervals over persons and episodes"
         return (
             f"{self.height:g} m, {self.mass:g} kg{calf}, on {worn}, asked for {self.speed:g} m/s. "
             f"Persons: {', '.join(self.persons)}. Each walks on each foot {self.what_ran}, as much at "
-            f"{self._other_speed:.3g} m/s, and as much pushed by ±{self.push_newton:g} N. Prices are at "
-            f"{self.speed:g} m/s walked. Changes are against {first}; their 95 % intervals are over persons and "
-            f"episodes.{alone} Feet less than {GAP:.0%} apart are not told apart. Push-off, of ankle and toe, is of "
+            f"{self._other_speed:.3g} m/s, and as much pushed by ±{self.push_newton:g} N. Prices in this table are at "
+            f"{speed:.2f} m/s walked, the nearest speed to the asked one that all walk; feet.csv has those of the "
+            f"speed that each walks. Changes are against {first}{intervals}. Feet less than {GAP:.0%} apart are not "
+            "told apart; one that falls or does not reach the speed has no price. Push-off, of ankle and toe, is of "
             "the side that wears the foot; peak force and moments are of the other side, the left one if both wear it."
         )
 

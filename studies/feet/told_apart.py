@@ -2,8 +2,8 @@
 
 Every person walks the same episodes on every foot, so that feet are compared in pairs of episodes. Two feet are told
 apart if they differ by `GAP` or more, the 95 % interval of the difference leaves 0 out, and every person has its sign.
-A slower walk has another price: so prices are taken at one speed, on the line through two walks at two commanded
-speeds.
+A slower walk has another price: so prices are taken at one speed that all walk, between two walks at two commanded
+speeds, never beyond them.
 """
 
 from collections.abc import Sequence
@@ -29,13 +29,19 @@ class Difference:
     """Low end of the 95 % interval."""
     high: float
     """High end of the 95 % interval."""
+    persons: int
+    """Number of persons."""
     told_apart: bool
     """True if the mean is `GAP` or more, the interval leaves 0 out, and every person's mean has its sign."""
 
     @property
     def text(self) -> str:
-        """Return the difference in percent with its interval, such as "−8 % (−10 to −6)"."""
-        return f"{_percent(self.mean)} % ({_percent(self.low)} to {_percent(self.high)})"
+        """Return the difference in percent with its interval, such as "−8 % (−10 to −6)".
+
+        Of one person there is no interval: episodes hardly differ, and it would know nothing of how others learn.
+        """
+        interval = f" ({_percent(self.low)} to {_percent(self.high)})" if self.persons > 1 else ""
+        return f"{_percent(self.mean)} %{interval}"
 
 
 def difference(prices: NDArray, others: NDArray) -> Difference:
@@ -45,11 +51,26 @@ def difference(prices: NDArray, others: NDArray) -> Difference:
     mean = float(shares.mean())
     signs = np.sign(shares.mean(1))
     apart = abs(mean) >= GAP and (low > 0.0 or high < 0.0) and bool((signs == signs[0]).all())
-    return Difference(mean=mean, low=low, high=high, told_apart=apart)
+    return Difference(mean=mean, low=low, high=high, persons=len(prices), told_apart=apart)
 
 
 LEAST_CHANGE = 0.02
 """Least difference of two walked speeds between which a price is interpolated [m/s]."""
+TOLERANCE = 0.005
+"""How far a speed may lie beyond two walked ones [m/s]; chosen, a rounding."""
+
+
+def common_speed(asked: float, walked: Sequence[NDArray | None]) -> float:
+    """Return the walked speed [m/s] nearest to the one `asked` for that lies between the two walks of every person on
+    every foot; `asked` itself if there is none.
+
+    `walked` (F,) are of each foot the speeds (2, P, E) of P persons in E episodes of two walks [m/s]; None where
+    somebody fell.
+    """
+    of_persons = [speeds.mean(-1) for speeds in walked if speeds is not None]
+    slowest = max((float(speeds.min(0).max()) for speeds in of_persons), default=asked)
+    fastest = min((float(speeds.max(0).min()) for speeds in of_persons), default=asked)
+    return float(np.clip(asked, slowest, fastest)) if slowest <= fastest else asked
 
 
 def price_at(speed: float, walked: NDArray, prices: NDArray) -> NDArray | None:
@@ -60,16 +81,15 @@ def price_at(speed: float, walked: NDArray, prices: NDArray) -> NDArray | None:
         walked: (2, P, E) speeds of the two walks [m/s].
         prices: (2, P, E) prices of the two walks.
 
-    Returns None where a person's two walks are of nearly one speed, or where `speed` is farther from both than they are
-    from each other: a foot can be too slow for it.
+    Returns None where a person's two walks are of nearly one speed, or where `speed` lies beyond both in the mean over
+    the episodes: a foot can be too slow for it.
     """
     change = walked[1] - walked[0]
-    if (np.abs(change) < LEAST_CHANGE).any():
+    of_persons = walked.mean(-1)  # (2, P)
+    beyond = (speed < of_persons.min(0) - TOLERANCE) | (speed > of_persons.max(0) + TOLERANCE)
+    if (np.abs(change) < LEAST_CHANGE).any() or beyond.any():
         return None
-    way = (speed - walked[0]) / change  # 0 at the first walk, 1 at the second
-    if ((way < -1.0) | (way > 2.0)).any():
-        return None
-    return prices[0] + (prices[1] - prices[0]) * way
+    return prices[0] + (prices[1] - prices[0]) * (speed - walked[0]) / change
 
 
 def verdict(price: str, names: Sequence[str], prices: Sequence[NDArray | None]) -> str:
@@ -96,7 +116,7 @@ def verdict(price: str, names: Sequence[str], prices: Sequence[NDArray | None]) 
     elif first not in like_least:
         sentence += f": {difference(walked[least], walked[first]).text} against {first}"
     dearer = [f"{name} {_percent(against_least[name].mean)} %" for name in walked if name not in (*like_least, first)]
-    return f"{sentence}. Dearer: {_list(dearer)}." if dearer else f"{sentence}."
+    return f"{sentence}. Against {least}: {_list(dearer)}." if dearer else f"{sentence}."
 
 
 def _percent(share: float) -> str:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from springfoot.studies.feet.told_apart import GAP, LEAST_CHANGE, difference, price_at, verdict
+from springfoot.studies.feet.told_apart import GAP, LEAST_CHANGE, common_speed, difference, price_at, verdict
 
 NOISE = 0.01 * np.random.default_rng(0).standard_normal((3, 8))
 """Of three persons in eight episodes."""
@@ -36,7 +36,8 @@ def test_the_verdict_names_the_least_its_like_and_the_dearer():
     prices = [first, 0.75 * first, 0.76 * first, 0.9 * first, None]
     words = verdict("fibre work", ["none", "4", "6", "9", "12"], prices)
     assert (
-        words == "Fibre work is least with 4, not told apart from 6: −25 % (−25 to −25) against none. Dearer: 9 +20 %."
+        words
+        == "Fibre work is least with 4, not told apart from 6: −25 % (−25 to −25) against none. Against 4: 9 +20 %."
     )
     assert (
         verdict("effort", ["none", "4"], [first, 0.99 * first]) == "Effort is least with 4, not told apart from none."
@@ -49,10 +50,27 @@ def test_the_verdict_names_the_least_its_like_and_the_dearer():
     )
 
 
-def test_a_price_at_one_speed_is_on_the_line_of_each_pair_of_walks():
-    walked = np.array([[[1.0, 1.1]], [[1.2, 1.2]]])
-    prices = 1.0 + 2.0 * walked  # a price that is linear in the speed
-    assert price_at(1.15, walked, prices) == pytest.approx(np.full((1, 2), 3.3))
-    assert price_at(1.05, walked, prices) == pytest.approx(np.full((1, 2), 3.1))
+def test_one_person_has_no_interval():
+    assert difference(np.full((1, 5), 2.7), np.full((1, 5), 3.0)).text == "−10 %"
+
+
+WALKED = np.array([[[1.0, 1.1]], [[1.2, 1.2]]])
+"""Speeds of two walks of one person in two episodes [m/s]."""
+
+
+def test_a_price_at_one_speed_is_on_the_line_of_each_pair_of_walks_and_never_beyond():
+    prices = 1.0 + 2.0 * WALKED  # a price that is linear in the speed
+    for speed in (1.05, 1.15, 1.2):
+        assert price_at(speed, WALKED, prices) == pytest.approx(np.full((1, 2), 1.0 + 2.0 * speed))
+    for speed in (1.0, 1.21, 1.4):
+        assert price_at(speed, WALKED, prices) is None
     assert price_at(1.15, np.array([[[1.0]], [[1.0 + 0.9 * LEAST_CHANGE]]]), prices[..., :1]) is None
-    assert price_at(1.41, walked, prices) is None and price_at(1.29, walked, prices) is not None  # too slow for it
+
+
+def test_feet_are_compared_at_a_speed_that_all_walk():
+    slower = WALKED - 0.06
+    assert common_speed(1.1, [WALKED, slower, None]) == 1.1
+    assert common_speed(1.3, [WALKED, slower]) == pytest.approx(1.14)  # the fastest of the slower one
+    assert common_speed(0.8, [WALKED, slower]) == pytest.approx(1.05)  # the slowest of the other
+    assert common_speed(1.1, [WALKED, WALKED - 0.5]) == 1.1  # there is none
+    assert common_speed(1.1, [None]) == 1.1
