@@ -3,9 +3,11 @@
 import csv
 import io
 import os
+import re
 from collections import Counter
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from itertools import chain
 from math import isfinite
 from pathlib import Path
 from stat import S_ISREG
@@ -25,6 +27,8 @@ LARGEST_VALUE = 1e12
 """Largest magnitude of a number in a cell; chosen, so that means and squares are finite."""
 
 
+_DECIMAL_COMMA = re.compile(r"\s*[-+]?\d*,\d+([eE][-+]?\d+)?\s*")
+"""A number with a decimal comma."""
 _NO_WAIT = getattr(os, "O_NONBLOCK", 0)
 """Flag with which opening a pipe does not wait for its other end."""
 
@@ -56,6 +60,16 @@ class Table:
             if value <= before:
                 raise self.error(line, column, f"{value:g} must be greater than {before:g} in the row before")
         return values
+
+    def renamed(self, names: Mapping[str, str]) -> "Table":
+        """Return the table with other names of columns; `names` is old -> new. A column that has a new name already is
+        left out."""
+        hidden = set(names.values()) & set(self.columns) - names.keys()
+        kept = [index for index, column in enumerate(self.columns) if column not in hidden]
+        columns = [names.get(self.columns[index], self.columns[index]) for index in kept]
+        return replace(
+            self, columns=columns, rows=[(line, [cells[index] for index in kept]) for line, cells in self.rows]
+        )
 
     def error(self, line: int, column: str, fault: str) -> SpringfootError:
         """Return the error that names a cell and its fault in one line."""
@@ -117,11 +131,31 @@ def has_content(path: Path, content: bytes) -> bool:
 
 
 def read_csv(path: Path) -> Table:
-    """Read a CSV file: a header, then rows of as many cells. Raises `SpringfootError` for any other file."""
+    """Read a CSV file: a header, then rows of as many cells. Raises `SpringfootError` for any other file.
+
+    Cells are separated by commas; in a file whose header has none, by semicolons or tabs, and its numbers may then have
+    decimal commas.
+    """
+    lines = text_lines(path)
+    head = []  # up to the line of names
+    for line in lines:
+        head.append(line)
+        if line.strip():
+            break
+    names = head[-1] if head else ""
+    separator = next((mark for mark in ",;\t" if mark in names), ",")
+    cells = enumerate(csv.reader(chain(head, lines), delimiter=separator, strict=True), 1)
+    if separator != ",":
+        cells = ((line, [_with_point(cell) for cell in row]) for line, row in cells)
     try:
-        return make_table(path.name, enumerate(csv.reader(text_lines(path), strict=True), 1))
+        return make_table(path.name, cells)
     except csv.Error as error:
         raise SpringfootError(f"{path.name} is not a CSV file: {error}") from None
+
+
+def _with_point(cell: str) -> str:
+    """Return a cell with a decimal point if it is a number with a decimal comma."""
+    return cell.replace(",", ".") if _DECIMAL_COMMA.fullmatch(cell) else cell
 
 
 def text_lines(path: Path) -> Iterator[str]:
@@ -144,7 +178,7 @@ def make_table(name: str, lines: Iterable[tuple[int, list[str]]]) -> Table:
     """Return the table of numbered lines of cells: the first is the header, empty lines are left out.
 
     `name`, that of the file, stands in errors. Raises `SpringfootError` for a table without data, with rows of another
-    length, a repeated column or another separator, and for one that is too large.
+    length or a repeated column, and for one that is too large.
     """
     # Read line by line, so that a table too large is refused before it fills the memory.
     filled = ((line, cells) for line, cells in lines if any(cell.strip() for cell in cells))
@@ -153,11 +187,6 @@ def make_table(name: str, lines: Iterable[tuple[int, list[str]]]) -> Table:
     if len(columns) > MOST_COLUMNS:
         raise SpringfootError(
             f"{name}, line {header}: must have at most {MOST_COLUMNS:,} columns, has {len(columns):,}"
-        )
-    # A single column whose name holds another separator: the file is not separated by commas.
-    if len(columns) == 1 and (separator := next((mark for mark in ";\t" if mark in names[0]), None)):
-        raise SpringfootError(
-            f"{name}, line {header}: cells must be separated by commas, with decimal points, got {separator!r}"
         )
     if repeated := next((column for column, times in Counter(columns).items() if times > 1), None):
         raise SpringfootError(f"{name}, line {header}: column {repeated} stands twice")

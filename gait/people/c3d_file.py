@@ -17,6 +17,7 @@ from springfoot.files.text_table import read_bytes
 
 from .gait_events import Contacts
 from .human import FORCES
+from .laboratory_names import with_internal_moments
 from .motion_files import FILE_SIDES, Series, Trial, not_empty
 
 PLATE_LOAD = 20.0
@@ -65,9 +66,7 @@ def read_c3d(path: Path) -> Trial:
                 curves[curve] = np.radians(x) if "moment" not in curve else x * (1.0 if newton_metres else 1e-3)
         if "hip" in curves and f"{letter}PelvisAngles" in markers:
             curves["thigh"] = curves["hip"] - np.radians(markers[f"{letter}PelvisAngles"][0])
-        if np.nanmean(curves.get("ankle_moment", [0.0])) < 0:  # external moments
-            for name in ("hip_moment", "knee_moment", "ankle_moment"):
-                curves[name] = -curves[name]
+        curves |= with_internal_moments(curves)
     frames = points.shape[2]
     feet = {side: (markers.get(f"{side[0].upper()}HEE"), markers.get(f"{side[0].upper()}TOE")) for side in FILE_SIDES}
     for side, (vertical, forward) in _plate_forces(file["data"].get("platform") or [], feet, frames).items():

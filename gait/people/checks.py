@@ -13,12 +13,11 @@ import numpy as np
 from springfoot.arrays import NDArray
 from springfoot.errors import SpringfootError
 
-from ..body.body import ANGLES, GRAVITY, REFERENCE_MASS
+from ..body.body import GRAVITY, REFERENCE_MASS
 from .gait_events import PERCENT
 from .human import COLUMNS, HumanGait
-from .strides import MeasuredWalk, cut_strides
+from .strides import ANGLE_CURVES, MeasuredWalk, cut_strides
 
-_ALL_ANGLES = (*ANGLES, "hip")
 _ZEROS = {"thigh": "upright", "hip": "a thigh in line with the pelvis", "ankle": "a shank at right angles to the sole"}
 _ZEROS |= {"toe": "a toe in line with the sole"}
 _LEVERS = ("hip_moment", "knee_moment", "ankle_moment")
@@ -246,7 +245,7 @@ def _mistaken_unit(kind: str, size: float) -> str:
 
 def _doubts_of_zero(mean: Curves, usual: Curves) -> Iterator[str]:
     """Yield a text for each angle whose mean is far from people's, as if counted from another zero."""
-    for curve in (name for name in mean if name in _ALL_ANGLES):
+    for curve in (name for name in mean if name in ANGLE_CURVES):
         offset = float(mean[curve].mean() - usual[curve].mean())
         if abs(offset) > LARGEST_OFFSET:
             yield (
@@ -258,14 +257,14 @@ def _doubts_of_zero(mean: Curves, usual: Curves) -> Iterator[str]:
 
 def _kind(curve: str) -> str:
     """Return the kind of a curve: angle, moment, power or grf."""
-    if curve in _ALL_ANGLES:
+    if curve in ANGLE_CURVES:
         return "angle"
     return "grf" if curve.startswith("grf") else curve.rpartition("_")[2]
 
 
 def _range_as_written(curve: str, values: NDArray) -> tuple[float, float]:
     """Return a curve's least and largest value in the unit of its column: degrees for angles."""
-    unit = 180 / np.pi if curve in _ALL_ANGLES else 1.0
+    unit = 180 / np.pi if curve in ANGLE_CURVES else 1.0
     return float(values.min()) * unit, float(values.max()) * unit
 
 

@@ -1,4 +1,4 @@
-"""Read text files of measured walks, CSV and OpenSim .mot and .sto, in the names, signs and units of `HumanGait`.
+"""Read text files of measured walks, tables and OpenSim .mot and .sto, in the names, signs and units of `HumanGait`.
 
 OpenSim: hip_flexion, ankle_angle and mtp_angle have our signs. knee_angle is negative in flexion in some models
 (gait2392) and positive in others (Rajagopal): `strides.merge_trials` turns it and its moment if its mean is negative.
@@ -7,10 +7,11 @@ of inverse dynamics) is positive as the coordinate, ours opposite.
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
@@ -20,17 +21,22 @@ from springfoot.files.text_table import Table, make_table, text_lines
 
 from .gait_events import Contacts
 from .human import COLUMNS, FORCES
+from .laboratory_names import laboratory_curves
 
+MEASURED = COLUMNS | {"toe_moment": "mtp_moment_Nm_per_kg"}
+"""Curve that a file may have -> its column in CSV files: those of `HumanGait`, and the toe's moment, plantarflexion
+positive, which of people is unknown."""
 LONGEST_HEADER = 200
 """Most lines of a header; chosen."""
 PELVIS = "pelvis_anterior_tilt_deg"
 """Column (forward positive) that turns hip into thigh if there is no thigh."""
-TIME_COLUMNS = ("time_s", "time")
+TIME_COLUMNS = ("time_s", "time", "Time")
 FILE_SIDES = ("left", "right")
 WALKING_SPEED = 0.3
 """Speed of the body in the laboratory below which it walks on a treadmill [m/s]; chosen."""
 
 Series = dict[str, NDArray]
+NO_NAMES: Mapping[str, str] = MappingProxyType({})
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -51,6 +57,10 @@ class Trial:
     """Side -> events in the file."""
     speed: float | None = None
     """Walking speed [m/s]; None if the file has none."""
+    columns: Sequence[str] = ()
+    """Names of the file's columns, if it is a text file."""
+    notes: tuple[str, ...] = ()
+    """Sentences on what was guessed."""
 
 
 def csv_trial(table: Table) -> Trial:
@@ -62,22 +72,23 @@ def csv_trial(table: Table) -> Trial:
         )
     speed = float(table.numbers("speed_m_s").mean()) if table.has("speed_m_s") else None
     legs = {side: our_columns(table, f"_{side}" if side else "") for side in ("", *FILE_SIDES)}
-    return Trial(name=table.name, time=table.ascending(time), legs=not_empty(table.name, legs), speed=speed)
+    legs = not_empty(table.name, legs)
+    return Trial(name=table.name, time=table.ascending(time), legs=legs, speed=speed, columns=table.columns)
 
 
 def our_columns(table: Table, suffix: str = "") -> Series:
-    """Return the curves of a table's columns named as in `COLUMNS` with `suffix` behind (as `_sd`), in SI units.
+    """Return the curves of a table's columns named as in `MEASURED` with `suffix` behind (as `_sd`), in SI units.
 
-    A missing thigh is computed from hip and pelvis.
+    A missing thigh is computed from hip and pelvis. `_left` and `_right` also bring a laboratory's names.
     """
-    curves = {}
-    for name, column in COLUMNS.items():
+    curves = laboratory_curves(table, suffix[1:]) if suffix[1:] in FILE_SIDES else {}
+    for name, column in MEASURED.items():
         if table.has(column + suffix):
             values = table.numbers(column + suffix)
             curves[name] = np.radians(values) if column.endswith("_deg") else values
     # The pelvis has a column with the suffix, or one for both legs; a spread of the thigh does not follow from spreads.
     pelvis = next((PELVIS + end for end in (suffix, "") if table.has(PELVIS + end)), None)
-    if "hip" in curves and "thigh" not in curves and pelvis and suffix != "_sd":
+    if "hip" in curves and "thigh" not in curves and pelvis and not suffix.endswith("_sd"):
         curves["thigh"] = curves["hip"] - np.radians(table.numbers(pelvis))
     return curves
 
@@ -85,18 +96,35 @@ def our_columns(table: Table, suffix: str = "") -> Series:
 _OPENSIM = {"hip_flexion": "hip", "knee_angle": "knee", "ankle_angle": "ankle", "mtp_angle": "toe"}
 """Coordinate of a model -> curve."""
 _OPENSIM_FORCE = {
-    "right": ("ground_force_v", "ground_force_1_v", "ground_force_r_v", "r_ground_force_v"),
-    "left": ("1_ground_force_v", "ground_force_2_v", "ground_force_l_v", "l_ground_force_v"),
+    "right": (
+        "ground_force_v",
+        "ground_force_1_v",
+        "ground_force_r_v",
+        "r_ground_force_v",
+        "ground_force_calcn_r_v",
+        "ground_force_right_v",
+    ),
+    "left": (
+        "1_ground_force_v",
+        "ground_force_2_v",
+        "ground_force_l_v",
+        "l_ground_force_v",
+        "ground_force_calcn_l_v",
+        "ground_force_left_v",
+    ),
 }
-"""Side -> beginnings of the names of its forces, before x or y."""
+"""Side -> beginnings of the names of its forces, before x or y; the last two are AddBiomechanics' and OpenCap's."""
+MOST_RADIANS = 4.0
+"""Largest excursion of a leg's angles in radians; a larger one is in degrees; chosen, people's knees make 1.1."""
 
 
-def opensim_trial(path: Path) -> Trial:
+def opensim_trial(path: Path, renamed: Mapping[str, str] = NO_NAMES) -> Trial:
     """Return an OpenSim motion or storage file: header with `inDegrees`, `endheader`, column names, rows.
 
     Angles `hip_flexion_r`, `knee_angle_r`, `ankle_angle_r`, `mtp_angle_r`, `pelvis_tilt` (also as the paths of OpenSim
     4, `/jointset/.../value`), the same with `_moment` behind [N m], forces `ground_force_vx` (forward), `_vy` (up) [N],
-    right; left as `_l`, and forces as `1_ground_force_v*`, `ground_force_2_v*` or `ground_force_l_v*`.
+    right; left as `_l`, and forces as in `_OPENSIM_FORCE`. `renamed` is a column in the file -> its name here. A header
+    without `inDegrees` is guessed by the range of the angles.
     """
     lines = text_lines(path)
     header = []
@@ -109,7 +137,8 @@ def opensim_trial(path: Path) -> Trial:
     in_degrees = next((m[1].lower() for line in header if (m := re.match(r"\s*inDegrees\s*=\s*(\w+)", line))), "")
     end = len(header)
     # The line of names is two below the header's last line.
-    table = make_table(path.name, ((n, _split(line)) for n, line in enumerate(lines, end + 2)))
+    as_read = make_table(path.name, ((n, _split(line)) for n, line in enumerate(lines, end + 2)))
+    table = as_read.renamed(renamed)
     names = table.columns
     if "time" not in names:
         raise SpringfootError(f"{path.name}, line {end + 2}: no column time")
@@ -122,8 +151,16 @@ def opensim_trial(path: Path) -> Trial:
                 curves[curve] = table.numbers(column)
         if "hip" in curves and tilt is not None:
             curves["thigh"] = curves["hip"] + tilt
+    notes = ()
+    if any(legs.values()) and not in_degrees:
+        widest = max(float(np.ptp(values)) for curves in legs.values() for values in curves.values())
+        in_degrees = "yes" if widest > MOST_RADIANS else "no"
+        unit_name = "degrees" if in_degrees == "yes" else "radians"
+        notes = (
+            f"{path.name} does not say inDegrees: its angles span {widest:.3g}, so they are taken as {unit_name}.",
+        )
     if any(legs.values()) and in_degrees not in ("yes", "no"):
-        raise SpringfootError(f"{path.name}: its header must say inDegrees=yes or inDegrees=no")
+        raise SpringfootError(f"{path.name}: its header must say inDegrees=yes or inDegrees=no, got {in_degrees!r:.40}")
     unit = np.pi / 180 if in_degrees == "yes" else 1.0
     # The pelvis's first and last position tell the speed, and whether the walk is towards the laboratory's -x.
     travelled = table.numbers("pelvis_tx")[[0, -1]] if "pelvis_tx" in names else np.zeros(2)
@@ -134,8 +171,7 @@ def opensim_trial(path: Path) -> Trial:
         for name in curves:
             curves[name] = curves[name] * unit
         for coordinate, curve in _OPENSIM.items():
-            # `HumanGait` has no moment of the toe.
-            if curve != "toe" and (column := f"{coordinate}_{side[0]}_moment") in names:
+            if (column := f"{coordinate}_{side[0]}_moment") in names:
                 curves[f"{curve}_moment"] = -table.numbers(column)
         # Files differ in the case of the forces' names.
         lower = {name.lower(): name for name in names}
@@ -148,9 +184,11 @@ def opensim_trial(path: Path) -> Trial:
         name=path.name,
         time=time,
         legs=not_empty(path.name, legs),
-        unscaled=("hip_moment", "knee_moment", "ankle_moment", *FORCES),
+        unscaled=(*(f"{curve}_moment" for curve in _OPENSIM.values()), *FORCES),
         knee_as_read=True,
         speed=abs(velocity) if abs(velocity) > WALKING_SPEED else None,
+        columns=as_read.columns,
+        notes=notes,
     )
 
 

@@ -1,10 +1,11 @@
 """Turn a user's measured walk into a `HumanGait`: a file, its strides, their mean and spread.
 
-It reads CSV in our columns, OpenSim's .mot and .sto (`motion_files`) and C3D (`c3d_process`). Heel strikes and toe-offs
+It reads CSV in our columns or a laboratory's, OpenSim's .mot and .sto (`motion_files`), C3D (`c3d_process`) and
+Visual3D's text (`visual3d_file`). Heel strikes and toe-offs
 come from the vertical force; without it, from the events in the file; without those, from the leg's motion.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -20,8 +21,18 @@ from .c3d_process import c3d_trial
 from .checks import AS_IT_IS, require_plausible, require_plausible_legs
 from .gait_events import CONTACT_THRESHOLD_BW, PERCENT
 from .human import COLUMNS, FORCES, PEOPLE_FILE, HumanGait, fourier_series, human_gait, stance_series
-from .motion_files import Series, csv_trial, opensim_trial, our_columns, refuse_impossible_angles
+from .motion_files import (
+    FILE_SIDES,
+    NO_NAMES,
+    Series,
+    Trial,
+    csv_trial,
+    opensim_trial,
+    our_columns,
+    refuse_impossible_angles,
+)
 from .strides import MeasuredWalk, cut_strides, merge_trials
+from .visual3d_file import read_visual3d
 
 ACCEPTED = {
     "speed": (0.1, 4.0, "m/s"),
@@ -114,51 +125,113 @@ def read_gait(
     side: str = "both",
     mass: float | None = None,
     trust_units: bool = False,
+    columns: Mapping[str, str] = NO_NAMES,
 ) -> OwnGait:
     """Return the mean walk in a file, or in several of the same walk (say OpenSim's angles, forces and moments).
 
     Args:
-        paths: CSV files, OpenSim's .mot and .sto, or C3D (needs ezc3d). A CSV file has the column `percent` 0, 1, ...,
-            100 and mean curves in our columns, their spread with `_sd` behind, as evaluate.py writes gait_cycle.csv; or
-            `time_s` and curves over time, with `_left` or `_right` behind for two legs.
+        paths: CSV files, OpenSim's .mot and .sto, Visual3D's .txt, or C3D (needs ezc3d). A CSV file has the column
+            `percent` 0, 1, ..., 100 (or 0, 2, ..., 100) and mean curves in our columns, their spread with `_sd` behind,
+            as evaluate.py writes gait_cycle.csv; or `time_s` and curves over time, with `_left` or `_right` behind for
+            two legs.
         condition: picks one of several gaits that stand below each other in a CSV file over `percent`.
         side: "both" pools the strides of both feet; or "left" or "right".
         mass: body mass [kg] by which forces and moments in N and N m are divided. By default it is the one that the
             forces bear over whole strides; without forces, moments in N m are left out.
         trust_units: accept curves that no walk has in these units and with these signs
             (`springfoot.gait.people.checks`).
+        columns: our name of a column -> its name in the files, where that is another one.
 
     Raises `SpringfootError` for an unreadable file, naming file, line and column, and for implausible curves, with the
     likeliest cause.
     """
-    if side not in ("both", "left", "right"):
-        raise SpringfootError(f"side must be 'both', 'left' or 'right', got {side!r}")
     if mass is not None:
         require_within("mass", mass, MASS_RANGE, "kg")
-    trials = []
+    read = read_files(paths, columns)
+    if isinstance(read, Table):
+        return gait_of_percents(one_condition(read, condition), side, trust_units)
+    return gait_of_walk(read, side, mass, trust_units)
+
+
+def read_files(paths: Sequence[str | Path], columns: Mapping[str, str] = NO_NAMES) -> Table | MeasuredWalk:
+    """Return what stands in files of one walk: a table of mean curves over percent, or the walk over time.
+
+    `columns` as of `read_gait`. Raises `SpringfootError` for an unreadable file, and for a column that is in none.
+    """
+    renamed = {theirs: ours for ours, theirs in columns.items()}
+    trials: list[Trial] = []
     for path in map(Path, paths):
         match path.suffix.lower():
-            case ".csv":
-                table = read_csv(path)
+            case ".csv" | ".txt":
+                as_read = read_csv(path) if path.suffix.lower() == ".csv" else read_visual3d(path)
+                table = as_read.renamed(renamed)
                 if "percent" in table.columns and len(paths) == 1:
-                    return _from_percent(table, condition, trust_units)
-                trials.append(csv_trial(table))
+                    _require_columns(renamed, as_read.columns)
+                    return table
+                trials.append(replace(csv_trial(table), columns=as_read.columns))
             case ".mot" | ".sto":
-                trials.append(opensim_trial(path))
+                trials.append(opensim_trial(path, renamed))
             case ".c3d":
                 trials.append(c3d_trial(path))
             case _:
-                raise SpringfootError(f"{path.name} must be a .csv, .mot, .sto or .c3d file")
+                raise SpringfootError(f"{path.name} must be a .csv, .txt, .mot, .sto or .c3d file")
     if not trials:
         raise SpringfootError("read_gait needs a file")
-    return _from_walk(merge_trials(trials), side, mass, trust_units)
+    _require_columns(renamed, [column for trial in trials for column in trial.columns])
+    return merge_trials(trials)
 
 
-def _from_percent(table: Table, condition: str | None, trust_units: bool) -> OwnGait:
-    """Return the gait in a table of mean curves over percent 0 to 100 of the stride."""
-    table = _one_condition(table, condition)
-    mean = our_columns(table)
-    sd = our_columns(table, "_sd")
+def _require_columns(names: Iterable[str], columns: Sequence[str]) -> None:
+    """Raise `SpringfootError` if one of `names` is not among the `columns` of the files."""
+    for name in names:
+        if name not in columns:
+            raise SpringfootError(f"no column {name!r:.60} in a text file; there are {', '.join(columns):.400}")
+
+
+def percent_curves(table: Table, end: str = "") -> dict[str, Series]:
+    """Return side -> curves (101,) of a table over percent: "" for curves without a side, and left, right.
+
+    `end` stands behind the names, as `_sd`. Curves on a 2 % grid are interpolated (piecewise cubic, without overshoot).
+    """
+    legs = {side: our_columns(table, f"_{side}{end}" if side else end) for side in ("", *FILE_SIDES)}
+    if len(table.rows) != len(PERCENT):
+        from scipy.interpolate import PchipInterpolator  # half a second to import
+
+        coarse = np.linspace(0, 100, len(table.rows))
+        for curves in legs.values():
+            curves |= {name: PchipInterpolator(coarse, values)(PERCENT) for name, values in curves.items()}
+    return {side: curves for side, curves in legs.items() if curves}
+
+
+def _require_side(side: str) -> None:
+    """Raise `SpringfootError` unless `side` is both, left or right."""
+    if side not in ("both", *FILE_SIDES):
+        raise SpringfootError(f"side must be 'both', 'left' or 'right', got {side!r}")
+
+
+def gait_of_percents(table: Table, side: str, trust_units: bool) -> OwnGait:
+    """Return the gait in a table of one gait's mean curves over percent 0 to 100 of the stride.
+
+    Curves without a side come first; otherwise those of `side`, or the mean of both.
+    """
+    _require_side(side)
+    legs = percent_curves(table)
+    spreads = percent_curves(table, "_sd")
+    chosen = FILE_SIDES if side == "both" else (side,)
+    if not trust_units:
+        for leg in FILE_SIDES:
+            if leg in legs and leg in chosen:
+                known = {curve: values for curve, values in legs[leg].items() if curve in COLUMNS}
+                require_plausible(f"{table.name}, the {leg} leg", known, _people_at(None))
+    mean: Series = {}
+    sd: Series = {}
+    for kind, of_kind in ((mean, legs), (sd, spreads)):
+        for curve in COLUMNS:
+            sided = [of_kind[leg][curve] for leg in chosen if curve in of_kind.get(leg, {})]
+            if curve in of_kind.get("", {}) and (side == "both" or not sided):
+                kind[curve] = of_kind[""][curve]
+            elif sided:
+                kind[curve] = np.mean(sided, axis=0)
     if not mean:
         raise SpringfootError(f"{table.name}, line 1: none of the columns {', '.join(COLUMNS.values())}")
 
@@ -183,16 +256,18 @@ def _from_percent(table: Table, condition: str | None, trust_units: bool) -> Own
     return _with_series(gait, mean, {name: curve for name, curve in sd.items() if name in mean}, trust_units)
 
 
-def _one_condition(table: Table, condition: str | None) -> Table:
-    """Return a table with the rows of one gait, percent 0 to 100; `condition` picks it from several.
+def one_condition(table: Table, condition: str | None) -> Table:
+    """Return a table with the rows of one gait, percent 0 to 100 by 1 or by 2; `condition` picks it from several.
 
     Raises `SpringfootError` for other percents, or if the condition is unknown or missing.
     """
     percent = table.numbers("percent")
-    size = len(PERCENT)  # rows of one gait
+    step = 2 if len(percent) > 1 and percent[1] == 2 else 1
+    size = 100 // step + 1  # rows of one gait
     for k, ((line, _), value) in enumerate(zip(table.rows, percent, strict=True)):
-        if value != k % size:
-            raise table.error(line, "percent", f"must be {k % size} here (0, 1, ..., 100), got {value:g}")
+        if value != k % size * step:
+            grid = f"{k % size * step} here (0, {step}, ..., 100)"
+            raise table.error(line, "percent", f"must be {grid}, got {value:g}")
     if len(percent) % size:
         line = table.rows[-1][0]
         raise table.error(line, "percent", f"ends at {percent[-1]:g}, must go on to 100")
@@ -211,8 +286,9 @@ def _one_condition(table: Table, condition: str | None) -> Table:
     return replace(table, name=f"{table.name}:{condition}", rows=blocks[names.index(condition)])
 
 
-def _from_walk(walk: MeasuredWalk, side: str, mass: float | None, trust_units: bool) -> OwnGait:
+def gait_of_walk(walk: MeasuredWalk, side: str, mass: float | None, trust_units: bool) -> OwnGait:
     """Return the mean gait of a walk's strides, or raise `SpringfootError` for curves that no walk has."""
+    _require_side(side)
     strides, curves = cut_strides(walk, side, mass)  # strides: heel strike, toe-off, next heel strike
     mean = {name: values.mean(axis=0) for name, values in curves.items()}
     for name in ("thigh", "hip"):

@@ -1,7 +1,7 @@
 """Cut measured walks into strides: common time, heel strikes and toe-offs, curves over percent of each stride."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,6 +15,8 @@ from .gait_events import CONTACT_THRESHOLD_BW, Contacts, find_contacts, on_perce
 from .human import COLUMNS, FORCES
 from .motion_files import Series, Trial, refuse_impossible_angles
 
+ANGLE_CURVES = ("thigh", "hip", "knee", "ankle", "toe")
+"""Curves that need no force plate."""
 FEWEST_STRIDES = 2
 """Fewest strides, of both feet together, for a mean and its spread."""
 LONGEST_TICK = 1 / 30
@@ -31,6 +33,10 @@ HEEL_STRIKE_AFTER, TOE_OFF_AFTER = 0.032, 0.006
 to 0.036 and 0.004 to 0.009 at 0.85 to 1.96 m/s."""
 CUTOFF = 6.0
 """Low-pass frequency of angles for events and rates [Hz]: usual for walking (Winter 2009, ch. 3)."""
+FILTER = f"second-order Butterworth low-pass at {CUTOFF:g} Hz, forward and back"
+"""The filter of `_smooth` in words."""
+STILL = 1e-6
+"""Largest excursion of a coordinate that was not measured, [rad] or the moment's unit; chosen."""
 WEIGHT_BEARING = (15, 45)
 """Percents of the stride between which a foot bears weight; chosen. A foot without load there was not on a plate."""
 
@@ -53,6 +59,8 @@ class MeasuredWalk:
     """Side -> events in a file."""
     speed: float | None
     """Walking speed [m/s]; None if no file has it."""
+    notes: tuple[str, ...] = ()
+    """Sentences on what was guessed or left out."""
 
     @property
     def last(self) -> float:
@@ -60,10 +68,28 @@ class MeasuredWalk:
         return self.first + self.tick * (min(len(c) for leg in self.legs.values() for c in leg.values()) - 1)
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LegStrides:
+    """The strides of one leg."""
+
+    times: NDArray
+    """(S, 3) heel strike, toe-off, next heel strike [s]."""
+    curves: Series
+    """Curve -> (S, 101) over percent of each stride, in the units of `HumanGait`."""
+    weighed: NDArray
+    """(S,) True for strides whose forces and moments count: none but those on a force plate, where the file has
+    forces."""
+
+    def counted(self, curve: str) -> NDArray:
+        """Return the strides (s, 101) of a curve that count."""
+        return self.curves[curve] if curve in ANGLE_CURVES else self.curves[curve][self.weighed]
+
+
 def merge_trials(trials: Sequence[Trial]) -> MeasuredWalk:
     """Merge trials of the same walk on common samples: each curve comes from the first trial that has it.
 
     Joint powers are computed where angle and moment are there, and knees bent backward are turned if the trial says so.
+    Angles and moments that stand still were not measured, and are left out.
 
     Raises `SpringfootError` for sampling too coarse, a gap, or no time in common.
     """
@@ -80,6 +106,9 @@ def merge_trials(trials: Sequence[Trial]) -> MeasuredWalk:
             )
     tick = max(min(float(np.median(np.diff(trial.time))) for trial in trials), SHORTEST_TICK)
     first = max(trial.time[0] for trial in trials)
+    if any(abs((first - trial.time[0]) / tick % 1.0 - 0.5) < 0.25 for trial in trials):
+        # Samples of one file lie between those of another: with twice as many both are kept, not smoothed.
+        tick = max(tick / 2, SHORTEST_TICK)
     last = min(trial.time[-1] for trial in trials)
     if last - first < tick:
         raise SpringfootError(f"{name}: the files have no time in common")
@@ -96,7 +125,13 @@ def merge_trials(trials: Sequence[Trial]) -> MeasuredWalk:
                     unsigned.setdefault(side, set()).add(curve)
                 if curve in trial.unscaled:
                     unscaled.add((side, curve))
+    notes = [note for trial in trials for note in trial.notes]
     for side, leg in legs.items():
+        still = [curve for curve, values in leg.items() if curve not in FORCES and np.ptp(values) <= STILL]
+        for curve in still:
+            value = float(leg.pop(curve)[0])
+            words = f"{side} {curve.replace('_', ' ')}".strip()
+            notes.append(f"{words} left out: it is {value:.3g} throughout, which is no measurement.")
         if side in unsigned and "knee" in leg and leg["knee"].mean() < 0:
             leg |= {curve: -leg[curve] for curve in unsigned[side] if curve in leg}
         refuse_impossible_angles(name, leg)
@@ -110,7 +145,19 @@ def merge_trials(trials: Sequence[Trial]) -> MeasuredWalk:
     # Reversed: of several trials with a side's events the first counts, being the last to be put in.
     contacts = {side: events for trial in reversed(trials) for side, events in trial.contacts.items()}
     speed = next((trial.speed for trial in trials if trial.speed is not None), None)
-    return MeasuredWalk(name=name, first=first, tick=tick, legs=legs, unscaled=unscaled, contacts=contacts, speed=speed)
+    legs = {side: leg for side, leg in legs.items() if leg}
+    if not legs:
+        raise SpringfootError(f"{name}: no curve moves")
+    return MeasuredWalk(
+        name=name,
+        first=first,
+        tick=tick,
+        legs=legs,
+        unscaled=unscaled,
+        contacts=contacts,
+        speed=speed,
+        notes=tuple(notes),
+    )
 
 
 def cut_strides(walk: MeasuredWalk, side: str = "both", mass: float | None = None) -> tuple[NDArray, Series]:
@@ -120,28 +167,58 @@ def cut_strides(walk: MeasuredWalk, side: str = "both", mass: float | None = Non
     it, 101), in the units of `HumanGait`. `side` is both, left or right; `mass` [kg] as in `own_data.read_gait`. Raises
     `SpringfootError` for too few strides.
     """
+    legs = strides_of_legs(walk, side, mass)
+    times = np.concatenate([leg.times for leg in legs.values()])
+    # Both legs' strides, one below the other.
+    curves = {}
+    for curve in COLUMNS:
+        if counted := [leg.counted(curve) for leg in legs.values() if curve in leg.curves]:
+            curves[curve] = np.concatenate(counted)
+    return times, {name: values for name, values in curves.items() if len(values) >= FEWEST_STRIDES}
+
+
+def strides_of_legs(walk: MeasuredWalk, side: str = "both", mass: float | None = None) -> dict[str, LegStrides]:
+    """Cut each leg of a walk into strides; arguments and errors as of `cut_strides`."""
+    mass = borne_mass(walk, side) if mass is None else mass
+    legs = _legs_as_read(walk, side)
+    return {name: replace(leg, curves=_scaled(leg.curves, name, walk.unscaled, mass)) for name, leg in legs.items()}
+
+
+def _legs_as_read(walk: MeasuredWalk, side: str) -> dict[str, LegStrides]:
+    """Cut each leg of a walk into strides, their curves in the units of the files."""
     chosen = {name: leg for name, leg in walk.legs.items() if side in ("both", name)}
     strides = {name: _strides_of_leg(walk, name) for name in chosen}
-    times = np.concatenate([*strides.values(), np.empty((0, 3))])
-    if len(times) < FEWEST_STRIDES:
+    if sum(map(len, strides.values())) < FEWEST_STRIDES:
+        count = sum(map(len, strides.values()))
         raise SpringfootError(
-            f"{walk.name}: needs at least {FEWEST_STRIDES} complete strides, has {len(times)} "
+            f"{walk.name}: needs at least {FEWEST_STRIDES} complete strides, has {count} "
             "(they are found in grf_vertical, events, or thigh or hip with knee)"
         )
-    cut: dict[tuple[str, str], NDArray] = {}  # (side, curve) -> (strides, 101)
+    legs = {}
     for name, leg in chosen.items():
         begin, _, end = strides[name].T
-        for curve, series in leg.items():
-            cut[name, curve] = on_percent(series, begin, end, walk.tick, walk.first)
-        _drop_unmeasured_forces(cut, name)
-    _normalise(cut, walk.unscaled, mass)
-    # Both legs' strides, one below the other.
-    curves = {
-        curve: np.concatenate([values for (_, name), values in cut.items() if name == curve])
-        for curve in COLUMNS
-        if any(name == curve for _, name in cut)
-    }
-    return times, {name: values for name, values in curves.items() if len(values) >= FEWEST_STRIDES}
+        curves = {curve: on_percent(series, begin, end, walk.tick, walk.first) for curve, series in leg.items()}
+        weighed = _on_plate(curves["grf_vertical"]) if "grf_vertical" in curves else np.full(len(begin), True)
+        legs[name] = LegStrides(times=strides[name], curves=curves, weighed=weighed)
+    return legs
+
+
+def borne_mass(walk: MeasuredWalk, side: str = "both") -> float | None:
+    """Return the mass that the vertical forces bear over whole strides [kg]; None without forces in N.
+
+    `side` is both, left or right.
+    """
+    legs = _legs_as_read(walk, side)
+    # Mean vertical force of each stride [N]; percent 100 is percent 0 of the next stride.
+    borne = [
+        leg.counted("grf_vertical")[:, :-1].mean(axis=1)
+        for side, leg in legs.items()
+        if (side, "grf_vertical") in walk.unscaled and "grf_vertical" in leg.curves
+    ]
+    if not sum(map(len, borne)):
+        return None
+    # Over a stride the two feet bear just the body's weight, and so one bears half of it.
+    return 2 * float(np.mean(np.concatenate(borne))) / GRAVITY
 
 
 def _strides_of_leg(walk: MeasuredWalk, side: str) -> NDArray:
@@ -221,35 +298,22 @@ def _body_weight(force: NDArray) -> float:
     return float(np.median(force[force > 0.5 * force.max()])) if force.max(initial=0.0) > 0 else 1.0
 
 
-def _drop_unmeasured_forces(cut: dict[tuple[str, str], NDArray], side: str) -> None:
-    """Drop, in place, a leg's forces in strides whose stance was not on a force plate.
+def _on_plate(vertical: NDArray) -> NDArray:
+    """Tell of each stride (S,) whether its stance was on a force plate; `vertical` (S, 101) is the force."""
+    low, high = WEIGHT_BEARING
+    # A foot on a plate bears most of the body weight there; 0.3 of it is beyond what noise shows.
+    return vertical[:, low : high + 1].min(axis=1, initial=np.inf) > 0.3 * _body_weight(vertical)
 
-    `cut` is (side, curve) -> (strides, 101).
+
+def _scaled(curves: Series, side: str, unscaled: Collection[tuple[str, str]], mass: float | None) -> Series:
+    """Return curves with the `unscaled` ones divided: forces by body weight, moments and powers by `mass` [kg].
+
+    Without a mass these curves are left out.
     """
-    vertical = cut.get((side, "grf_vertical"))
-    if vertical is not None:
-        low, high = WEIGHT_BEARING
-        # A foot on a plate bears most of the body weight there; 0.3 of it is beyond what noise shows.
-        measured = vertical[:, low : high + 1].min(axis=1) > 0.3 * _body_weight(vertical)
-        for name in FORCES:
-            if (side, name) in cut:
-                cut[side, name] = cut[side, name][measured]
-
-
-def _normalise(cut: dict[tuple[str, str], NDArray], unscaled: set[tuple[str, str]], mass: float | None) -> None:
-    """Divide the `unscaled` curves in place: forces by body weight, moments and powers by body mass.
-
-    `cut` is (side, curve) -> (strides, 101). The mass is `mass` [kg], or the one that the vertical forces bear; without
-    either these curves are dropped.
-    """
-    weight = None if mass is None else mass * GRAVITY  # [N]
-    # Mean vertical force of each stride [N]; percent 100 is percent 0 of the next stride.
-    borne = [cut[key][:, :-1].mean(axis=1) for key in unscaled if key[1] == "grf_vertical" and key in cut]
-    if weight is None and sum(map(len, borne)):  # at least one stride with a measured force
-        # Over a stride the two feet bear just the body's weight, and so one bears half of it.
-        weight = 2 * float(np.mean(np.concatenate(borne)))
-    for key in unscaled & cut.keys():
-        if weight is None:
-            del cut[key]
-        else:
-            cut[key] = cut[key] / (weight if key[1] in FORCES else weight / GRAVITY)
+    scaled = {}
+    for name, values in curves.items():
+        if (side, name) not in unscaled:
+            scaled[name] = values
+        elif mass is not None:
+            scaled[name] = values / (mass * (GRAVITY if name in FORCES else 1.0))
+    return scaled

@@ -17,6 +17,18 @@ WORST_CONDITION = 1e10
 """Condition number of the normal equations, columns of unit size, beyond which columns count as collinear."""
 
 
+def jackknife_interval(value: float, without: NDArray, inflation: float = 1.0) -> Estimate:
+    """Return a value with its confidence interval, from its values (T,) that leave out one of T trials each.
+
+    `inflation` multiplies the variance.
+    """
+    trials = len(without)
+    # Jackknife variance: (T - 1) / T times the squared deviations of the T values.
+    variance = inflation * (trials - 1) / trials * np.sum((without - without.mean()) ** 2)
+    half = stdtrit(trials - 1, (1 + CONFIDENCE) / 2) * np.sqrt(variance)  # Student's t
+    return Estimate(float(value), float(value - half), float(value + half))
+
+
 class TrialFit(NamedTuple):
     """Least squares of all trials, and again without each trial."""
 
@@ -34,11 +46,7 @@ class TrialFit(NamedTuple):
 
         `value` is the function at `coefficients`, `without` (trials,) the function at each row of `self.without`.
         """
-        trials = len(without)
-        # Jackknife variance: (T - 1) / T times the squared deviations of the T values that leave out a trial.
-        variance = self.inflation * (trials - 1) / trials * np.sum((without - without.mean()) ** 2)
-        half = stdtrit(trials - 1, (1 + CONFIDENCE) / 2) * np.sqrt(variance)  # Student's t
-        return Estimate(float(value), float(value - half), float(value + half))
+        return jackknife_interval(value, without, self.inflation)
 
     def chance(self, first: int) -> float:
         """Return the p-value of coefficients `first` and later ones being all 0, by Hotelling's T^2; 1 with too few

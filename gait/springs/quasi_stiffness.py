@@ -1,13 +1,81 @@
-"""Compare the ankle's quasi-stiffness, the slope of its angle-moment curve, between people's mean curves and published
-trials.
+"""Compute quasi-stiffness, the slope of a joint's moment over its angle, by phase of stance.
+
+That of strides is the slope of their mean curves, with an interval over strides. People's mean curves stand beside
+published trials.
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
+from springfoot.arrays import NDArray
+
 from ..people.human import human_gait
 from .identification import PhaseSpring, identify
+from .jackknife import jackknife_interval
+from .spring_fit import Estimate
+from .stiffness import ankle_events, toe_events
+
+SMALLEST_TURN = np.radians(2.0)
+"""Least excursion of the angle in a phase for a slope over it to mean something [rad]; chosen."""
+SLOPE_STEP = 0.005
+"""Time between the samples of a slope [strides]; chosen."""
+
+
+class StancePhase(NamedTuple):
+    """A part of stance."""
+
+    name: str
+    start: float
+    """Stride phase at its beginning."""
+    end: float
+    """Stride phase at its end."""
+
+
+def stance_phases(joint: str, angle: NDArray, toe_off: float) -> list[StancePhase]:
+    """Return the phases of stance of a joint, ankle or toe, from its mean angle (101,) over percent of the stride.
+
+    The ankle's are those of `FUKUCHI_OVERGROUND`: they end at foot flat, half-way between it and maximum dorsiflexion,
+    at maximum dorsiflexion and at toe-off. The toe's end at heel-off, at its largest angle and at toe-off. A phase that
+    a walk does not have is left out.
+    """
+    phase = np.linspace(0.0, 1.0, len(angle))
+    if joint == "ankle":
+        strike, flat, top, off = ankle_events(phase, angle, toe_off).values()
+        bounds = [strike, flat, (flat + top) / 2, top, off]
+        names = [name for name, *_ in FUKUCHI_OVERGROUND]
+    else:
+        bounds = list(toe_events(phase, angle, toe_off).values())
+        names = ["flat foot", "heel rise", "push-off"]
+    return [
+        StancePhase(name, start, end) for name, (start, end) in zip(names, pairwise(bounds), strict=True) if end > start
+    ]
+
+
+def phase_slope(angle: NDArray, moment: NDArray, phase: StancePhase) -> Estimate | None:
+    """Return the slope of the mean moment over the mean angle in a phase, by least squares, [N m/rad] for [N m].
+
+    `angle` [rad] and `moment` (S, 101) are curves of S strides over percent of the stride; the moment is positive
+    against the angle, so that a spring's slope is positive. The interval leaves out one stride after another
+    (`jackknife`); of a single stride it is infinite. None where the angle makes less than `SMALLEST_TURN`.
+    """
+    count = max(round((phase.end - phase.start) / SLOPE_STEP), 2) + 1
+    at = np.linspace(phase.start, phase.end, count)
+    percent = np.linspace(0.0, 1.0, angle.shape[1])
+    angles, moments = (np.array([np.interp(at, percent, row) for row in rows]) for rows in (angle, moment))
+    if np.ptp(angles.mean(axis=0)) < SMALLEST_TURN:
+        return None
+
+    def slope(of: NDArray) -> float:
+        return float(np.polyfit(angles[of].mean(axis=0), moments[of].mean(axis=0), 1)[0])
+
+    strides = np.arange(len(angles))
+    value = slope(strides)
+    if len(strides) < 2:
+        return Estimate(value, -np.inf, np.inf)
+    return jackknife_interval(value, np.array([slope(strides[strides != stride]) for stride in strides]))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,0 +1,116 @@
+"""Read the motion files of one person: their mean gait as `read_gait` reads it, and each leg's strides behind it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from springfoot.errors import SpringfootError, require_within
+from springfoot.files.text_table import Table
+
+from ..body.body import MASS_RANGE
+from .checks import AS_IT_IS
+from .gait_events import PERCENT
+from .motion_files import NO_NAMES
+from .own_data import ACCEPTED, OwnGait, gait_of_percents, gait_of_walk, one_condition, percent_curves, read_files
+from .strides import LegStrides, MeasuredWalk, borne_mass, strides_of_legs
+
+MASSES_APART = 1.1
+"""Largest factor between the given mass and the one that the forces bear that is not told; chosen."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Measurement:
+    """One person's walk, measured."""
+
+    gait: OwnGait
+    """Their mean gait: of both legs together, or of the side that was asked for."""
+    legs: Mapping[str, LegStrides]
+    """Side (left, right, or "" for curves without a side) -> strides; a mean curve counts as one stride."""
+    mass: float | None
+    """Body mass [kg]; None if nothing tells it."""
+    mass_from: str
+    """Where the mass comes from, in words."""
+    notes: tuple[str, ...]
+    """Sentences on what was guessed or left out."""
+
+    def toe_off(self, side: str) -> float | None:
+        """Return the mean phase of toe-off of a leg, 0..1; None if nothing tells it."""
+        begin, off, end = self.legs[side].times.T
+        return float(np.mean((off - begin) / (end - begin))) if len(begin) else self.gait.toe_off
+
+
+def read_measurement(
+    paths: Sequence[str | Path],
+    *,
+    condition: str | None = None,
+    side: str = "both",
+    mass: float | None = None,
+    speed: float | None = None,
+    trust_units: bool = False,
+    columns: Mapping[str, str] = NO_NAMES,
+) -> Measurement:
+    """Return one person's walk from its files; `speed` [m/s] goes before that of the files, the rest as of `read_gait`.
+
+    Legs on which the strides are too few for a spread have what there is. Raises `SpringfootError` as `read_gait` does,
+    for forces that bear nobody's mass, and for a toe's moment larger than the ankle's.
+    """
+    if mass is not None:
+        require_within("mass", mass, MASS_RANGE, "kg")
+    if speed is not None:
+        low, high, unit = ACCEPTED["speed"]
+        require_within("speed", speed, (low, high), unit)
+    read = read_files(paths, columns)
+    notes: list[str] = []
+    if isinstance(read, Table):
+        table = one_condition(read, condition)
+        gait = gait_of_percents(table, side, trust_units)
+        legs = {
+            leg: LegStrides(
+                times=np.empty((0, 3)),
+                curves={name: values[None] for name, values in curves.items()},
+                weighed=np.ones(1, bool),
+            )
+            for leg, curves in percent_curves(table).items()
+            if side == "both" or leg in (side, "")
+        }
+        if len(table.rows) != len(PERCENT):
+            notes.append(f"{table.name} has a row every 2 % of the stride: interpolated between them.")
+        borne = None
+    else:
+        walk: MeasuredWalk = read if speed is None else replace(read, speed=speed)
+        borne = borne_mass(walk, side)
+        if mass is None and borne is not None:
+            low, high = MASS_RANGE
+            if not low <= borne <= high:
+                raise SpringfootError(
+                    f"{walk.name}: the vertical forces bear {borne:.3g} kg, must be {low:g} to {high:g}: are they in N?"
+                )
+        gait = gait_of_walk(walk, side, mass, trust_units)
+        legs = {leg: strides for leg, strides in strides_of_legs(walk, side, mass).items() if len(strides.times)}
+        notes += walk.notes
+        if any(name.endswith("_moment") for _, name in walk.unscaled) and mass is None and borne is None:
+            notes.append("Moments left out: they are in N m, and without forces only --mass tells the body mass.")
+    if speed is not None:
+        gait = replace(gait, speed=speed)
+    _require_small_toe_moment(gait.name, legs, trust_units)
+    mass_from = "as given" if mass is not None else "from the forces over whole strides"
+    if mass is not None and borne is not None and not 1 / MASSES_APART < borne / mass < MASSES_APART:
+        notes.append(f"The forces bear {borne:.3g} kg, not {mass:g}.")
+    return Measurement(
+        gait=gait, legs=legs, mass=borne if mass is None else mass, mass_from=mass_from, notes=tuple(notes)
+    )
+
+
+def _require_small_toe_moment(name: str, legs: Mapping[str, LegStrides], trust_units: bool) -> None:
+    """Raise `SpringfootError` for a toe's moment larger than the ankle's, whose lever is longer."""
+    for side, leg in legs.items():
+        if trust_units or not {"toe_moment", "ankle_moment"} <= leg.curves.keys() or not leg.weighed.any():
+            continue
+        toe, ankle = (np.abs(leg.counted(curve).mean(axis=0)).max() for curve in ("toe_moment", "ankle_moment"))
+        if toe > ankle:
+            raise SpringfootError(
+                f"{name}, the {side or 'one'} leg: the toe's moment reaches {toe:.3g} N m/kg, the ankle's {ankle:.3g}: "
+                f"another unit? {AS_IT_IS}"
+            )
