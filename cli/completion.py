@@ -19,6 +19,7 @@ COMMANDS = {
     "evaluate": "evaluate.EvaluateFlags",
     "live": "live.LiveFlags",
     "feet": "feet.FootChoice",
+    "person": "person.Person",
     "export": "export.ExportFlags",
     "datasets": "datasets.DatasetsFlags",
     "examples": "examples.ExamplesFlags",

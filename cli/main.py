@@ -24,7 +24,7 @@ FIRST = """To begin with:
 
 springfoot --help lists all commands."""
 """Commands that a newcomer types, in their order."""
-COMMANDS = ("train", "evaluate", "live", "feet", "export", "study", "datasets", "examples", "completion")
+COMMANDS = ("train", "evaluate", "live", "feet", "person", "export", "study", "datasets", "examples", "completion")
 """Names of all commands."""
 HELP = f"""usage: springfoot {{{",".join(COMMANDS)}}} ...
 
@@ -32,6 +32,7 @@ HELP = f"""usage: springfoot {{{",".join(COMMANDS)}}} ...
   springfoot evaluate POLICY        how human is its walk? numbers, curves, pictures; POLICY may be pretrained
   springfoot live POLICY            walk it in a browser, its stiffness, speed, slope, body and feet under sliders
   springfoot feet                   which spring or foot takes a person least? such as --spring 0 2 4 6
+  springfoot person FILE ...        how stiff is this person? ankle and toe from their motion files
   springfoot export POLICY          write it as an ONNX file, which runs without springfoot
   springfoot study NAME             hold many walks against each other; springfoot study --help lists them
   springfoot datasets               write Minari sets of walks, for offline learning
@@ -103,6 +104,10 @@ def _run(words: list[str]) -> int:
                 from .feet import feet_main
 
                 return feet_main(rest)
+            case ["person", *rest]:
+                from .person import person_main
+
+                return person_main(rest)
             case ["export", *rest]:
                 from .export import export_main
 

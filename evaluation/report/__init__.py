@@ -7,8 +7,19 @@ from springfoot.lazy import lazy_names
 if TYPE_CHECKING:
     from .gait_figure import MODEL, PEOPLE, PLAN, PNG, STYLE
     from .gait_table import people_metrics
+    from .schedule_tables import schedule_csv, states_json, table_of_states
 
-__all__ = ["MODEL", "PEOPLE", "PLAN", "PNG", "STYLE", "people_metrics"]
+__all__ = [
+    "MODEL",
+    "PEOPLE",
+    "PLAN",
+    "PNG",
+    "STYLE",
+    "people_metrics",
+    "schedule_csv",
+    "states_json",
+    "table_of_states",
+]
 
 if not TYPE_CHECKING:  # a type checker would take it to mean that any name exists
     __getattr__ = lazy_names(
@@ -20,5 +31,8 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
             "PNG": "gait_figure",
             "STYLE": "gait_figure",
             "people_metrics": "gait_table",
+            "schedule_csv": "schedule_tables",
+            "states_json": "schedule_tables",
+            "table_of_states": "schedule_tables",
         },
     )

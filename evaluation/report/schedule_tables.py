@@ -4,7 +4,7 @@ Both are read back as policies (`springfoot.agents.policies.schedule_files`).
 """
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ from springfoot.envs.physics.model import SIDES, damping_times
 from springfoot.envs.settings.settings import body_of, reference_gait
 from springfoot.files.digest import BLANK_DIGEST, DIGEST, with_digest
 from springfoot.files.writing import csv_text
+from springfoot.gait.body.body import Body
 from springfoot.gait.people.gait_events import PERCENT
 from springfoot.gait.springs.stiffness import SPRINGS
 
@@ -34,30 +35,59 @@ def write_schedules(folder: Path, recording: Recording) -> None:
 
     Where both legs decide and the feet differ, each leg has its own, `finite_states_left.json` and `_right`.
     """
-    curves = schedule_curves(recording)
     settings = recording.settings
     body = body_of(recording.settings)
+    text = schedule_csv(recording.policy, body, settings.speed, settings.equilibrium, schedule_curves(recording))
+    (folder / "stiffness_schedule.csv").write_text(text, encoding="utf-8", newline="")
+    groups = alike_legs(settings) if deciding_legs(settings) else []
+    for legs in groups:
+        table = states_json(finite_states(recording, legs))
+        end = f"_{SIDES[legs[0]]}" if len(groups) > 1 else ""
+        (folder / f"finite_states{end}.json").write_text(table, encoding="utf-8")
+
+
+def schedule_csv(policy: str, body: Body, speed: float, equilibrium: str, curves: Mapping[str, NDArray]) -> str:
+    """Return the text of a schedule over percent of the stride, which is a policy of the name `policy`.
+
+    `curves` are (101,) by column as of `schedule_curves`, `equilibrium` is the setting that they need.
+    """
     # Columns that say where the curves come from, the same in every row.
     origin = {
-        "policy": recording.policy,
+        "policy": policy,
         "height_m": body.height,
         "mass_kg": body.total_mass,
-        "speed_m_s": settings.speed,
-        "equilibrium": settings.equilibrium,
+        "speed_m_s": speed,
+        "equilibrium": equilibrium,
     }
     rows = []
     for percent in map(int, PERCENT):
         of_percent = [curve[percent] for curve in curves.values()]
         rows.append([percent, *origin.values(), *of_percent, BLANK_DIGEST])
     # The digest of the whole text stands in each row, in place of the blank one, so that a changed file is noticed.
-    text = with_digest(csv_text(["percent", *origin, *curves, DIGEST], rows))
-    (folder / "stiffness_schedule.csv").write_text(text, encoding="utf-8", newline="")
-    groups = alike_legs(settings) if deciding_legs(settings) else []
-    for legs in groups:
-        states = finite_states(recording, legs) | {DIGEST: BLANK_DIGEST}
-        table = with_digest(json.dumps(states, indent=2, allow_nan=False, ensure_ascii=False) + "\n")
-        end = f"_{SIDES[legs[0]]}" if len(groups) > 1 else ""
-        (folder / f"finite_states{end}.json").write_text(table, encoding="utf-8")
+    return with_digest(csv_text(["percent", *origin, *curves, DIGEST], rows))
+
+
+def states_json(table: Mapping[str, Any]) -> str:
+    """Return the text of a table of finite states, as `table_of_states` returns it."""
+    return with_digest(
+        json.dumps({**table, DIGEST: BLANK_DIGEST}, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
+    )
+
+
+def table_of_states(policy: str, body: Body, speed: float, states: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return the content of a table of finite states, a policy of the name `policy`; `states` as in
+    `finite_states`."""
+    return {
+        "format": "springfoot finite states",
+        "version": 1,
+        "policy": policy,
+        "law": "torque = stiffness x (equilibrium - angle - damping_time x rate) in SI; dorsiflexion, toe up positive",
+        "phase": "share of the leg's stride, from its heel strike on; a state holds until the next one begins",
+        "height_m": body.height,
+        "mass_kg": body.total_mass,
+        "speed_m_s": speed,
+        "states": states,
+    }
 
 
 def schedule_curves(recording: Recording) -> dict[str, NDArray]:
@@ -140,14 +170,4 @@ def finite_states(recording: Recording, legs: Sequence[int]) -> dict[str, Any]:
                 entry |= {"stiffness_Nm_per_rad": mean["stiffness"], "equilibrium_deg": float(np.degrees(rest))}
             state[spring] = entry
         states.append(state)
-    return {
-        "format": "springfoot finite states",
-        "version": 1,
-        "policy": recording.policy,
-        "law": "torque = stiffness x (equilibrium - angle - damping_time x rate) in SI; dorsiflexion, toe up positive",
-        "phase": "share of the leg's stride, from its heel strike on; a state holds until the next one begins",
-        "height_m": body.height,
-        "mass_kg": body.total_mass,
-        "speed_m_s": settings.speed,
-        "states": states,
-    }
+    return table_of_states(recording.policy, body, settings.speed, states)

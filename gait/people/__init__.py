@@ -8,7 +8,9 @@ from springfoot.lazy import lazy_names
 
 if TYPE_CHECKING:
     from .gait_events import CONTACT_THRESHOLD_BW, PERCENT, Contacts, find_contacts, find_steps, on_percent, sample
-    from .human import HumanGait, human_gait
+    from .human import COLUMNS, HumanGait, human_gait
+    from .measurement import Measurement, read_measurement
+    from .motion_files import MEASURED
     from .own_data import read_gait
     from .scores import (
         LOADING_END_PERCENT,
@@ -19,14 +21,19 @@ if TYPE_CHECKING:
         rmse,
         stride_work,
     )
+    from .strides import FILTER
 
 __all__ = [
+    "COLUMNS",
     "CONTACT_THRESHOLD_BW",
+    "FILTER",
     "LOADING_END_PERCENT",
+    "MEASURED",
     "PERCENT",
     "PUSH_OFF_BEGIN_PERCENT",
     "Contacts",
     "HumanGait",
+    "Measurement",
     "correlation",
     "find_contacts",
     "find_steps",
@@ -35,6 +42,7 @@ __all__ = [
     "mean_sd",
     "on_percent",
     "read_gait",
+    "read_measurement",
     "rmse",
     "sample",
     "stride_work",
@@ -44,6 +52,11 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
     __getattr__ = lazy_names(
         __name__,
         {
+            "COLUMNS": "human",
+            "FILTER": "strides",
+            "MEASURED": "motion_files",
+            "Measurement": "measurement",
+            "read_measurement": "measurement",
             "CONTACT_THRESHOLD_BW": "gait_events",
             "LOADING_END_PERCENT": "scores",
             "PERCENT": "gait_events",

@@ -1,8 +1,8 @@
 """Recognise the curves of a motion laboratory's software by their names: Plug-in Gait's and Visual3D's, in any table.
 
-`LKneeAngles`, `R_ANKLE_MOMENT`, `Left Hip Angle`, with an X behind or nothing: angles in degrees, moments per kg. Plug-in
-Gait has our signs, and moments in N mm/kg; Visual3D counts turns about the axis to the right, so its knee flexes below 0
-and its pelvis tilts forward below 0, and its moments at hip and ankle are opposite to ours.
+`LKneeAngles`, `R_ANKLE_MOMENT`, `Left Hip Angle`, with an X behind or nothing: angles in degrees, moments per kg.
+Plug-in Gait has our signs, and moments in N mm/kg. Visual3D counts turns about the axis to the right: its knee flexes
+below 0, its pelvis tilts forward below 0, and its moments at hip and ankle are opposite to ours.
 """
 
 import re
@@ -22,7 +22,7 @@ MOST_NM_PER_KG = 20.0
 
 def laboratory_curves(table: Table, side: str) -> dict[str, NDArray]:
     """Return the curves of a side (left, right) in a table with a laboratory's names, in the units and signs of
-    `HumanGait`; without a toe's moment of its own sign."""
+    `HumanGait`."""
     found: dict[str, NDArray] = {}
     for column in table.columns:
         match = NAME.fullmatch(column)

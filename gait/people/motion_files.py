@@ -32,6 +32,8 @@ PELVIS = "pelvis_anterior_tilt_deg"
 """Column (forward positive) that turns hip into thigh if there is no thigh."""
 TIME_COLUMNS = ("time_s", "time", "Time")
 FILE_SIDES = ("left", "right")
+PARAMETERS = {"speed": "speed_m_s", "stride_time": "stride_time_s", "step_length": "step_length_m"}
+"""Number beside mean curves -> its column."""
 WALKING_SPEED = 0.3
 """Speed of the body in the laboratory below which it walks on a treadmill [m/s]; chosen."""
 
@@ -114,6 +116,18 @@ _OPENSIM_FORCE = {
     ),
 }
 """Side -> beginnings of the names of its forces, before x or y; the last two are AddBiomechanics' and OpenCap's."""
+
+
+def known_columns() -> set[str]:
+    """Return all names of columns that the readers of text files know, but for those of laboratories."""
+    known = {*TIME_COLUMNS, "percent", *PARAMETERS.values(), "toe_off_percent", "n", "condition"}
+    sides = ("", *(f"_{side}" for side in FILE_SIDES))
+    known |= {f"{column}{side}{sd}" for column in (*MEASURED.values(), PELVIS) for side in sides for sd in ("", "_sd")}
+    known |= {"pelvis_tilt", "pelvis_tx"}
+    known |= {f"{coordinate}_{side}{end}" for coordinate in _OPENSIM for side in "lr" for end in ("", "_moment")}
+    return known | {f"{start}{axis}" for starts in _OPENSIM_FORCE.values() for start in starts for axis in "xy"}
+
+
 MOST_RADIANS = 4.0
 """Largest excursion of a leg's angles in radians; a larger one is in degrees; chosen, people's knees make 1.1."""
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from springfoot.arrays import NDArray
-from springfoot.errors import SpringfootError, require_count, require_within
+from springfoot.errors import SpringfootError, perhaps, require_count, require_within
 from springfoot.files.text_table import Table, read_csv
 
 from ..body.body import MASS_RANGE
@@ -24,9 +24,11 @@ from .human import COLUMNS, FORCES, PEOPLE_FILE, HumanGait, fourier_series, huma
 from .motion_files import (
     FILE_SIDES,
     NO_NAMES,
+    PARAMETERS,
     Series,
     Trial,
     csv_trial,
+    known_columns,
     opensim_trial,
     our_columns,
     refuse_impossible_angles,
@@ -41,7 +43,6 @@ ACCEPTED = {
     "toe_off": (0.3, 0.9, "of the stride"),
 }
 """Parameter beside the curves -> least and largest accepted value, and unit; chosen."""
-_PARAMETERS = {"speed": "speed_m_s", "stride_time": "stride_time_s", "step_length": "step_length_m"}
 COMFORTABLE_SPEED = 1.2
 """Speed of the people to compare curves of unknown speed with [m/s]; chosen."""
 SPEEDS_APART = 1.4
@@ -156,8 +157,12 @@ def read_gait(
 def read_files(paths: Sequence[str | Path], columns: Mapping[str, str] = NO_NAMES) -> Table | MeasuredWalk:
     """Return what stands in files of one walk: a table of mean curves over percent, or the walk over time.
 
-    `columns` as of `read_gait`. Raises `SpringfootError` for an unreadable file, and for a column that is in none.
+    `columns` as of `read_gait`. Raises `SpringfootError` for an unreadable file, for a column that is in none, and for
+    a name that means nothing here.
     """
+    for ours in columns:
+        if ours not in (known := known_columns()):
+            raise SpringfootError(f"columns: {ours!r:.60} is no column that is read here{perhaps(ours, sorted(known))}")
     renamed = {theirs: ours for ours, theirs in columns.items()}
     trials: list[Trial] = []
     for path in map(Path, paths):
@@ -251,7 +256,7 @@ def gait_of_percents(table: Table, side: str, trust_units: bool) -> OwnGait:
         toe_off=None if toe_off is None else toe_off / 100,
         mean={},  # `_with_series` puts the series here
         sd={},
-        **{name: parameter(column) for name, column in _PARAMETERS.items()},
+        **{name: parameter(column) for name, column in PARAMETERS.items()},
     )
     return _with_series(gait, mean, {name: curve for name, curve in sd.items() if name in mean}, trust_units)
 

@@ -8,8 +8,9 @@ if TYPE_CHECKING:
     from .foot_file import read_foot
     from .identification import PhaseSpring, identify
     from .identification_by_pushes import REACTS, SPRING, PushedSpring, identify_pushed
+    from .quasi_stiffness import StancePhase, phase_slope, stance_phases
     from .spring_fit import Estimate
-    from .stiffness import LOWEST_STIFFNESS, SPRINGS, Segment, StiffnessSchedule
+    from .stiffness import LOWEST_STIFFNESS, SPRINGS, Segment, StiffnessSchedule, ankle_events, toe_events, with_swing
 
 __all__ = [
     "LOWEST_STIFFNESS",
@@ -20,16 +21,28 @@ __all__ = [
     "PhaseSpring",
     "PushedSpring",
     "Segment",
+    "StancePhase",
     "StiffnessSchedule",
+    "ankle_events",
     "identify",
     "identify_pushed",
+    "phase_slope",
     "read_foot",
+    "stance_phases",
+    "toe_events",
+    "with_swing",
 ]
 
 if not TYPE_CHECKING:  # a type checker would take it to mean that any name exists
     __getattr__ = lazy_names(
         __name__,
         {
+            "ankle_events": "stiffness",
+            "toe_events": "stiffness",
+            "StancePhase": "quasi_stiffness",
+            "phase_slope": "quasi_stiffness",
+            "stance_phases": "quasi_stiffness",
+            "with_swing": "stiffness",
             "LOWEST_STIFFNESS": "stiffness",
             "REACTS": "identification_by_pushes",
             "SPRING": "identification_by_pushes",

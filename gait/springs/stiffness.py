@@ -215,9 +215,18 @@ def thesis_schedule(
         lowest=(LOWEST_STIFFNESS[0] * scale, LOWEST_STIFFNESS[1] * scale),
         toe_stiffness=TOE_STIFFNESS * scale,
     )
-    # The swing segment, the last one of each joint, is replaced.
-    ankle, toe = (Segment(human.toe_off, k * scale, radians(rest_deg)) for k, rest_deg in swing)
-    return StiffnessSchedule((*stance.ankle[:-1], ankle), (*stance.toe[:-1], toe))
+    return with_swing(stance, body, swing)
+
+
+def with_swing(
+    schedule: StiffnessSchedule, body: Body, swing: tuple[tuple[float, float], ...] = THESIS_SWING
+) -> StiffnessSchedule:
+    """Return a schedule of `schedule_from_curves` with other springs in swing, `swing` as of `thesis_schedule`."""
+    segments = []
+    for joint, (k, rest_deg) in zip(SPRINGS, swing, strict=True):
+        *stance, last = getattr(schedule, joint)
+        segments.append((*stance, Segment(last.start, k * body.stiffness_scale, radians(rest_deg))))
+    return StiffnessSchedule(*segments)
 
 
 def _stance(phase: ArrayLike, angle: ArrayLike, toe_off: float) -> tuple[NDArray, NDArray]:

@@ -46,19 +46,22 @@ def read_own_gait(words: str, trust_units: bool = False, mass: float | None = No
     commas between. Moments in N m are divided by the mass that the forces show; in files without forces by `mass` [kg],
     that of the body. Raises `SpringfootError` for a file that cannot be read.
     """
-    files = [words]
-    condition = None
-    if not Path(words).is_file():
-        file, _, after_colon = words.rpartition(":")
-        if "," in words:
-            files = words.split(",")
-        elif Path(file).is_file():
-            files = [file]
-            condition = after_colon
+    files, condition = files_of(words)
     gait = read_gait(*files, condition=condition, trust_units=trust_units)
     if mass is not None and "grf_vertical" not in gait.mean:
         gait = read_gait(*files, condition=condition, trust_units=trust_units, mass=mass)
     return gait.to_json()
+
+
+def files_of(words: str) -> tuple[list[str], str | None]:
+    """Return the files, and the condition in them, that the value of `--human` names, as of `read_own_gait`."""
+    if not Path(words).is_file():
+        file, _, after_colon = words.rpartition(":")
+        if "," in words:
+            return words.split(","), None
+        if Path(file).is_file():
+            return [file], after_colon
+    return [words], None
 
 
 def _read_json_or_none(may_be_none: bool, words: list[str], opening: str = "{") -> Any:

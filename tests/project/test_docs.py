@@ -21,6 +21,7 @@ from springfoot.cli.main import STUDIES, main, study_class
 from springfoot.cli.train import TrainFlags
 from springfoot.gait import human_gait
 from springfoot.studies.feet.foot_choice import FootChoice
+from springfoot.studies.springs.person import Person
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
@@ -146,7 +147,7 @@ def test_every_command_that_a_document_names_is_understood(command):
         assert not words or words[0] in get_args(Shell)
     elif program[0] == "springfoot" and program[1] != "study" and words:
         flags = {"train": TrainFlags, "evaluate": EvaluateFlags, "export": ExportFlags, "live": LiveFlags}
-        flags |= {"examples": ExamplesFlags, "feet": FootChoice}
+        flags |= {"examples": ExamplesFlags, "feet": FootChoice, "person": Person}
         tyro.cli(flags[program[1]], args=words)
     else:
         assert program[0] != "springfoot" or words in ([], ["--help"], ["NAME"])

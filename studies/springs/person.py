@@ -1,0 +1,457 @@
+"""Read one person's motion files, and tell how stiff their ankles and toes are over stance.
+
+    springfoot person walk.mot forces.mot moments.sto
+    springfoot person walk.csv --mass 71 --columns knee_flexion_deg_left=KneeL --side left
+
+Quasi-stiffness by phase beside people's, the person's curves, and their springs as a schedule that walks here.
+"""
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from functools import cached_property, partial
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal
+
+import numpy as np
+import tyro
+
+from springfoot.arrays import NDArray
+from springfoot.envs.physics import damping_times
+from springfoot.errors import SpringfootError
+from springfoot.evaluation.report import schedule_csv, states_json, table_of_states
+from springfoot.files.markdown import MISSING, table, text_of
+from springfoot.files.writing import csv_text
+from springfoot.gait import Body, HumanGait, human_gait, schedule_from_curves
+from springfoot.gait.body import REFERENCE_HEIGHT, REFERENCE_MASS, TOE_STIFFNESS
+from springfoot.gait.people import FILTER, MEASURED, PERCENT, Measurement, read_measurement
+from springfoot.gait.springs import (
+    LOWEST_STIFFNESS,
+    SPRINGS,
+    Estimate,
+    Segment,
+    StancePhase,
+    StiffnessSchedule,
+    ankle_events,
+    phase_slope,
+    stance_phases,
+    toe_events,
+    with_swing,
+)
+
+from ..base.flags import files_of
+from ..base.study import Answer, OnProgress, Study
+from .person_figures import draw_curves, draw_loops
+
+USUAL_SPEED = 1.2
+"""Speed of the norm where nothing tells the person's [m/s]."""
+NO_SPRING = (
+    "A quasi-stiffness is a slope of this walk's own curve, moment over angle, and no property of a spring in the "
+    "joint: any stiffness gives the same curve at another rest angle (docs/explanation/stiffness.md)."
+)
+STATE_NAMES = {
+    "heel strike": "loading",
+    "foot flat": "mid-stance",
+    "heel-off": "heel rise",
+    "maximum dorsiflexion of the ankle": "push-off",
+    "maximum dorsiflexion of the toe": "toe push-off",
+    "toe-off": "swing",
+}
+"""Event at which a finite state begins -> its name."""
+EVENTS = {
+    "ankle": ("heel strike", "foot flat", "maximum dorsiflexion of the ankle", "toe-off"),
+    "toe": ("heel strike", "heel-off", "maximum dorsiflexion of the toe", "toe-off"),
+}
+"""Joint -> events between which its schedule has springs."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PhaseStiffness:
+    """Quasi-stiffness of one joint of one leg in one phase of stance."""
+
+    joint: str
+    side: str
+    """left, right, both for curves without a side, or norm."""
+    phase: StancePhase
+    slope: Estimate | None
+    """[N m/rad], per kg without a mass; None where the angle hardly moves."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Person(Study):
+    """How stiff is this person? Reads the motion files of one walk, and tells ankle and toe by phase of stance.
+
+    Writes the person's curves beside people's, and a schedule of stiffness that `springfoot evaluate` walks.
+    """
+
+    files: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="FILE ...")]
+    """Motion files of one walk: CSV, OpenSim's .mot and .sto, .c3d, Visual3D's .txt; FILE:CONDITION for one of several
+    in a CSV. docs/how-to/own-data.md says what is read."""
+    mass: float | None = None
+    """Body mass [kg]; None takes the mass that the forces bear."""
+    height: float = REFERENCE_HEIGHT
+    """Body height [m], of the norm and of the body that walks the schedule."""
+    side: Literal["left", "right", "both"] = "both"
+    """Side whose strides count for the schedule and the means."""
+    columns: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="OURS=THEIRS")] = ()
+    """Name of a column here, and its name in the files, such as knee_angle_r=KneeRight; once for each column."""
+    speed: float | None = None
+    """Walking speed [m/s]; None takes that of the files."""
+    trust_units: tyro.conf.FlagCreatePairsOff[bool] = False
+    """Take the files as they are, even if units or signs look wrong."""
+    train: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
+    """Print the command that trains a policy towards this person, into this folder."""
+
+    REPEATABLE: ClassVar[Collection[str]] = frozenset({"--columns"})
+
+    def check(self) -> None:
+        """Refuse a missing file, columns without two names, and a body out of range."""
+        if not self.files:
+            raise SpringfootError("give the motion files of one person, such as walk.mot forces.mot")
+        for words in self.columns:
+            ours, equals, theirs = words.partition("=")
+            if not (ours and equals and theirs):
+                raise SpringfootError(
+                    f"--columns must be OURS=THEIRS, such as knee_angle_r=KneeRight, got {words!r:.60}"
+                )
+        if len({words.partition("=")[0] for words in self.columns}) < len(self.columns):
+            raise SpringfootError("--columns names one of our columns twice")
+        Body(height=self.height)
+
+    def ask(self, progress: OnProgress) -> Answer:
+        """Read the files, and put the person beside people."""
+        return _Sheet(self, self._read()).answer()
+
+    def _read(self) -> Measurement:
+        """Return the person's walk."""
+        named = [files_of(words) for words in self.files]
+        condition = named[0][1] if len(named) == 1 else None
+        return read_measurement(
+            [file for files, _ in named for file in files],
+            condition=condition,
+            side=self.side,
+            mass=self.mass,
+            speed=self.speed,
+            trust_units=self.trust_units,
+            columns=dict(words.split("=", 1) for words in self.columns),
+        )
+
+
+class _Sheet:
+    """What is said of one person."""
+
+    def __init__(self, asked: Person, measured: Measurement):
+        self._asked = asked
+        self._measured = measured
+        self._speed = measured.gait.speed or USUAL_SPEED
+        self._mass = measured.mass
+        self._norm: HumanGait = human_gait(self._speed, asked.height)
+        self._gait: HumanGait = measured.gait.gait(self._speed, asked.height)
+        if not any("ankle" in leg.curves for leg in measured.legs.values()):
+            raise SpringfootError(
+                f"{measured.gait.name}: no ankle angle, such as {MEASURED['ankle']} or ankle_angle_r; "
+                "--columns names it if it is called otherwise"
+            )
+
+    @property
+    def _unit(self) -> str:
+        """Return the unit of a stiffness."""
+        return "N·m/rad" if self._mass else "N·m/(rad·kg)"
+
+    @property
+    def _body(self) -> Body:
+        """Return the body that walks the schedule."""
+        return Body(height=self._asked.height, mass=self._mass or REFERENCE_MASS)
+
+    def answer(self) -> Answer:
+        """Return text and files."""
+        files: dict[str, Any] = {
+            "quasi_stiffness.csv": self._stiffness_csv(),
+            "curves.csv": self._curves_csv(),
+        }
+        notes = list(self._measured.notes)
+        try:
+            springs = self._schedule()
+            files |= {"schedule.csv": self._schedule_csv(springs), "finite_states.json": self._states(springs)}
+        except SpringfootError as error:
+            notes.append(f"No schedule: {error}.")
+        files["curves.png"] = partial(draw_curves, sheet=self._drawn(), norm=self._norm)
+        files["torque_angle.png"] = partial(draw_loops, sheet=self._drawn(), norm=self._norm, starts=self._starts())
+        return Answer(text=self._text(notes, "schedule.csv" in files), files=files)
+
+    # Quasi-stiffness -----------------------------------------------------------------------------------------
+
+    @cached_property
+    def rows(self) -> list[PhaseStiffness]:
+        """Return the quasi-stiffness of each joint, leg and phase, those of people behind."""
+        rows = []
+        factor = self._mass or 1.0
+        for joint in SPRINGS:
+            moment = f"{joint}_moment"
+            for side, leg in self._measured.legs.items():
+                toe_off = self._measured.toe_off(side) or self._norm.toe_off
+                if {joint, moment} <= leg.curves.keys() and leg.weighed.any():
+                    angles, moments = (leg.curves[name][leg.weighed] for name in (joint, moment))
+                    for phase in stance_phases(joint, angles.mean(axis=0), toe_off):
+                        slope = phase_slope(angles, factor * moments, phase)
+                        rows.append(PhaseStiffness(joint=joint, side=side or "both", phase=phase, slope=slope))
+            if moment in self._norm.mean_series:
+                angle, torque = (self._norm.mean(name, PERCENT / 100)[None] for name in (joint, moment))
+                scale = factor * self._body.length_scale
+                for phase in stance_phases(joint, angle[0], self._norm.toe_off):
+                    slope = phase_slope(angle, scale * torque, phase)
+                    rows.append(PhaseStiffness(joint=joint, side="norm", phase=phase, slope=slope))
+        return rows
+
+    @property
+    def _sides(self) -> list[str]:
+        """Return the columns of the table."""
+        return [*(side or "both" for side in self._measured.legs), "norm"]
+
+    def _table(self) -> str:
+        """Return the table of quasi-stiffness: a row for each joint and phase."""
+        pattern = ".0f" if self._mass else ".2f"
+        names = list(dict.fromkeys((row.joint, row.phase.name) for row in self.rows))
+        lines = []
+        for joint, name in names:
+            cells = []
+            for side in self._sides:
+                of = [row for row in self.rows if (row.joint, row.phase.name, row.side) == (joint, name, side)]
+                cells.append(_cell(of[0], pattern) if of else MISSING)
+            lines.append([f"{joint}, {name}", *cells])
+        return table([f"quasi-stiffness, {self._unit}", *self._sides], lines)
+
+    def _stiffness_csv(self) -> str:
+        """Return the table of quasi-stiffness as CSV."""
+        head = ["joint", "phase", "side", "from_percent", "to_percent", "unit", "quasi_stiffness", "low", "high"]
+        unit = self._unit.replace("·", " ")
+        lines = []
+        for row in self.rows:
+            slope = [None] * 3 if row.slope is None else list(row.slope)
+            place = [row.joint, row.phase.name, row.side, 100 * row.phase.start, 100 * row.phase.end]
+            lines.append([*place, unit, *slope])
+        return csv_text(head, lines)
+
+    # Curves --------------------------------------------------------------------------------------------------
+
+    def _drawn(self) -> dict[str, dict[str, NDArray]]:
+        """Return side -> curve -> its mean (101,)."""
+        return {
+            side or "both": {name: leg.counted(name).mean(axis=0) for name in MEASURED if _has(leg, name)}
+            for side, leg in self._measured.legs.items()
+        }
+
+    def _starts(self) -> dict[tuple[str, str], list[float]]:
+        """Return joint and side -> stride phases at which the phases of stance begin, and the end of the last."""
+        starts: dict[tuple[str, str], list[float]] = {}
+        for row in self.rows:
+            starts.setdefault((row.joint, row.side), [row.phase.start]).append(row.phase.end)
+        return starts
+
+    def _curves_csv(self) -> str:
+        """Return the curves as CSV: those of the strides that count, which `--human` reads, left, right and norm."""
+        gait = self._measured.gait
+        numbers = {
+            "n": gait.strides,
+            "speed_m_s": gait.speed,
+            "stride_time_s": gait.stride_time,
+            "step_length_m": gait.step_length,
+            "toe_off_percent": None if gait.toe_off is None else 100 * gait.toe_off,
+        }
+        numbers = {name: value for name, value in numbers.items() if value is not None}
+        columns: dict[str, NDArray] = {}
+        phase = PERCENT / 100
+        for name, column in MEASURED.items():
+            unit = np.degrees(1.0) if column.endswith("_deg") else 1.0
+            if name in gait.mean:
+                columns[column] = unit * self._gait.mean(name, phase)
+            if name in gait.sd:
+                columns[f"{column}_sd"] = unit * self._gait.sd(name, phase)
+            for side, leg in self._measured.legs.items():
+                if side and _has(leg, name):
+                    columns[f"{column}_{side}"] = unit * leg.counted(name).mean(axis=0)
+                    if len(leg.counted(name)) > 1:
+                        columns[f"{column}_{side}_sd"] = unit * leg.counted(name).std(axis=0, ddof=1)
+            if name in self._norm.mean_series:
+                columns[f"{column}_norm"] = unit * self._norm.mean(name, phase)
+                columns[f"{column}_norm_sd"] = unit * self._norm.sd(name, phase)
+        rows = ([percent, *numbers.values(), *(values[percent] for values in columns.values())] for percent in PERCENT)
+        return csv_text(["percent", *numbers, *columns], rows)
+
+    # Springs -------------------------------------------------------------------------------------------------
+
+    def _toe_moment(self) -> NDArray | None:
+        """Return the mean moment of the toe (101,) [N m/kg] of the strides that count; None if it was not measured."""
+        counted = [leg.counted("toe_moment") for leg in self._measured.legs.values() if _has(leg, "toe_moment")]
+        return np.concatenate(counted).mean(axis=0) if counted else None
+
+    def _schedule(self) -> StiffnessSchedule:
+        """Return the person's springs by equation (4) of the thesis, their rest angles corrected for the damping of the
+        model's joints."""
+        gait = self._gait
+        body = self._body
+        phase = np.linspace(0.0, gait.toe_off, 1001)
+        own_mass = body.total_mass
+        ankle_mass = own_mass if "ankle_moment" in self._measured.gait.mean else own_mass * body.length_scale
+        toe = self._toe_moment()
+        scale = body.stiffness_scale
+        springs = schedule_from_curves(
+            phase,
+            gait.toe_off,
+            (gait.mean("ankle", phase), -ankle_mass * gait.mean("ankle_moment", phase)),
+            None if toe is None else (gait.mean("toe", phase), -own_mass * np.interp(phase, PERCENT / 100, toe)),
+            lowest=(LOWEST_STIFFNESS[0] * scale, LOWEST_STIFFNESS[1] * scale),
+            toe_stiffness=TOE_STIFFNESS * scale,
+        )
+        damped = []
+        for joint, beta in zip(SPRINGS, damping_times(body)[-len(SPRINGS) :], strict=True):
+            segments = getattr(springs, joint)
+            moved = []
+            for segment, after in pairwise(segments):
+                change = np.diff(gait.mean(joint, np.array([segment.start, after.start])))[0]
+                rate = change / (after.start - segment.start) / gait.stride_time
+                moved.append(Segment(segment.start, segment.stiffness, float(segment.equilibrium + beta * rate)))
+            damped.append((*moved, segments[-1]))
+        return with_swing(StiffnessSchedule(*damped), body)
+
+    @property
+    def _policy(self) -> str:
+        """Return the name of the schedule as a policy."""
+        return f"person {self._measured.gait.name}"
+
+    def _schedule_csv(self, springs: StiffnessSchedule) -> str:
+        """Return the springs over percent of the stride."""
+        stiffness, rest = springs.at(np.minimum(PERCENT, 99.999) / 100)
+        curves = {f"{joint}_stiffness_Nm_per_rad": stiffness[:, k] for k, joint in enumerate(SPRINGS)}
+        curves |= {f"{joint}_equilibrium_deg": np.degrees(rest[:, k]) for k, joint in enumerate(SPRINGS)}
+        return schedule_csv(self._policy, self._body, self._speed, "phase", curves)
+
+    def _states(self, springs: StiffnessSchedule) -> str:
+        """Return the springs as finite states, which begin at the events of ankle and toe."""
+        events: dict[float, str] = {}
+        for joint in SPRINGS:
+            starts = [segment.start for segment in getattr(springs, joint)]
+            known = _events(self._gait, joint)
+            events |= {start: known[round(start, 6)] for start in starts if start not in events}
+        betas = damping_times(self._body)[-len(SPRINGS) :]
+        states = []
+        for start, event in sorted(events.items()):
+            stiffness, rest = springs.at(start)
+            state: dict[str, Any] = {"name": STATE_NAMES[event], "phase": round(start, 6), "event": event}
+            for k, joint in enumerate(SPRINGS):
+                state[joint] = {
+                    "stiffness_Nm_per_rad": float(stiffness[k]),
+                    "damping_time_s": float(betas[k]),
+                    "equilibrium_deg": float(np.degrees(rest[k])),
+                }
+            states.append(state)
+        return states_json(table_of_states(self._policy, self._body, self._speed, states))
+
+    # Words ---------------------------------------------------------------------------------------------------
+
+    def _text(self, notes: list[str], has_schedule: bool) -> str:
+        """Return the report."""
+        has_rows = any(row.side != "norm" for row in self.rows)
+        parts = [self._verdict(), self._table(), self._below(has_rows), NO_SPRING, self._read_list(notes)]
+        if has_schedule:
+            parts.append(self._schedule_words())
+        if self._asked.train is not None:
+            parts.append(self._train_words())
+        parts += ["![Curves](curves.png)", "![Moment over angle](torque_angle.png)"]
+        return "\n\n".join(parts)
+
+    def _verdict(self) -> str:
+        """Return the answer in a sentence."""
+        pattern = ".0f" if self._mass else ".2f"
+        late = {row.side: row.slope for row in self.rows if (row.joint, row.phase.name) == ("ankle", "late rising")}
+        own = [f"{slope.value:{pattern}} {side}" for side, slope in late.items() if side != "norm" and slope]
+        if not own:
+            return "**No moment of an ankle was measured: the files give curves, but no stiffness.**"
+        norm = late.get("norm")
+        beside = f"; people's norm is {norm.value:{pattern}}" if norm else ""
+        words = " and ".join(own).replace(" both", "")
+        return f"**In late mid-stance the ankle's moment rises by {words} {self._unit}{beside}.**"
+
+    def _below(self, has_rows: bool) -> str:
+        """Return the paragraph below the table."""
+        several = any(row.slope and np.isfinite(row.slope.low) for row in self.rows)
+        words = "In brackets: 95 % interval over strides"
+        if not several:
+            words = "Without intervals: there is one curve a leg"
+        words += (
+            "; behind it the part of the stride, in percent. – : the angle makes less than 2°, or was not measured."
+        )
+        if has_rows and not any(row.joint == "toe" for row in self.rows):
+            words += " The toe has none: no moment of it (mtp_angle_r_moment, mtp_moment_Nm_per_kg) is in the files."
+        return f"{words} The norm's toe is unknown; its ankle is scaled with mass and height."
+
+    def _read_list(self, notes: list[str]) -> str:
+        """Return the list of what was read, borrowed and left out."""
+        gait = self._measured.gait
+        counts = {side: len(leg.times) for side, leg in self._measured.legs.items() if len(leg.times)}
+        strides = ", ".join(f"{count} {side}".strip() for side, count in counts.items())
+        if not strides:
+            strides = "mean curves" if gait.strides is None else f"mean curves of {gait.strides}"
+        weighed = {side: int(leg.weighed.sum()) for side, leg in self._measured.legs.items()}
+        if any(weighed[side] < count for side, count in counts.items()):
+            strides += f" (on a force plate {', '.join(f'{weighed[side]} {side}'.strip() for side in counts)})"
+        speed = "as given" if self._asked.speed else "from the files"
+        borrowed = ", ".join(name.replace("_", " ") for name in self._gait.borrowed if not name.endswith(" sd"))
+        lines = [
+            f"Files: {gait.name}; strides: {strides}; side: {self._asked.side}.",
+            f"Speed: {gait.speed:.2f} m/s, {speed}."
+            if gait.speed
+            else f"Speed: unknown; the norm is of {USUAL_SPEED:g} m/s. --speed gives it.",
+            f"Mass: {self._mass:.1f} kg, {self._measured.mass_from}."
+            if self._mass
+            else f"Mass: unknown: stiffness is per kg, the schedule of {REFERENCE_MASS:g} kg. --mass gives it.",
+            f"Norm: 20 adults at {self._norm.speed:.2f} m/s, {self._asked.height:g} m tall"
+            f"{', the nearest measured speed' if self._norm.clamped else ''}.",
+            f"Borrowed from the norm: {borrowed or 'nothing'}.",
+            f"Filter: none on the curves; {FILTER}, on angles for events and joint powers."
+            if counts
+            else "Filter: none.",
+            *notes,
+        ]
+        return "\n".join(f"- {line}" for line in lines)
+
+    def _schedule_words(self) -> str:
+        """Return the paragraph on the schedule, with the command that walks it."""
+        body = f"--mass {self._body.mass:.4g} --height {self._asked.height:g} --speed {self._speed:.3g}"
+        borrowed = "" if self._toe_moment() is not None else " The toe's stiffness is the model's own."
+        return (
+            "`schedule.csv` and `finite_states.json` hold straight lines between events of the mean curves, both legs "
+            f"alike; swing is the model's.{borrowed} `springfoot evaluate schedule.csv {body}` walks it here, in the "
+            "folder of these results."
+        )
+
+    def _train_words(self) -> str:
+        """Return the command that trains towards this person."""
+        place = Path("curves.csv") if self._asked.out is None else self._asked.out / "curves.csv"
+        where = " in the folder of these results" if self._asked.out is None else ""
+        body = f"--mass {self._body.mass:.4g} --height {self._asked.height:g} --speed {self._speed:.3g}"
+        command = f"springfoot train --human {place} {body} --out {self._asked.train}"
+        return f"To train a policy towards this person{where}: `{command}`"
+
+
+def _events(gait: HumanGait, joint: str) -> dict[float, str]:
+    """Return the phases of a joint's events in stance -> their names; of those that coincide the last."""
+    phase = np.linspace(0.0, gait.toe_off, 1001)
+    find = ankle_events if joint == "ankle" else toe_events
+    times = find(phase, gait.mean(joint, phase), gait.toe_off).values()
+    return {round(time, 6): name for time, name in zip(times, EVENTS[joint], strict=True)}
+
+
+def _has(leg: Any, name: str) -> bool:
+    """Tell whether a leg has strides of a curve that count."""
+    return name in leg.curves and len(leg.counted(name)) > 0
+
+
+def _cell(row: PhaseStiffness, pattern: str) -> str:
+    """Return a cell of the table: slope, interval, part of the stride."""
+    part = f"{100 * row.phase.start:.0f}–{100 * row.phase.end:.0f} %"
+    if row.slope is None:
+        return f"{MISSING}, {part}"
+    value, low, high = row.slope
+    interval = f" ({low:{pattern}} to {high:{pattern}})" if np.isfinite(low) else ""
+    return f"{text_of(value, pattern)}{interval}, {part}"
