@@ -63,7 +63,8 @@ class Table:
 
     def renamed(self, names: Mapping[str, str]) -> "Table":
         """Return the table with other names of columns; `names` is old -> new. A column that has a new name already is
-        left out."""
+        left out, and old names that the table lacks change nothing."""
+        names = {old: new for old, new in names.items() if old in self.columns}
         hidden = set(names.values()) & set(self.columns) - names.keys()
         kept = [index for index, column in enumerate(self.columns) if column not in hidden]
         columns = [names.get(self.columns[index], self.columns[index]) for index in kept]

@@ -26,9 +26,35 @@ COORDINATES = dict(zip(JOINTS, ("hip_flexion", "knee_angle", "ankle_angle", "mtp
 
 
 def write_opensim(folder: Path, recording: Recording) -> None:
-    """Write `walk.mot`, the coordinates, and `walk.sto`, ground reaction forces and joint moments, of one episode."""
+    """Write one episode: `walk.mot`, the coordinates, `walk.sto`, ground reaction forces and joint moments, and
+    `external_loads.xml`, which puts the forces on the feet of a model."""
     _write_storage(folder / "walk.mot", "coordinates", opensim_coordinates(recording), in_degrees=True)
     _write_storage(folder / "walk.sto", "forces and moments", opensim_forces(recording), in_degrees=False)
+    (folder / "external_loads.xml").write_text(external_loads("walk.sto"), encoding="utf-8", newline="")
+
+
+def external_loads(forces: str) -> str:
+    """Return OpenSim's external loads, which put the forces in the file `forces` on the bodies calcn_l and calcn_r.
+
+    These are the rear feet of its models of walking.
+    """
+    lines = ['<?xml version="1.0" encoding="UTF-8"?>', '<OpenSimDocument Version="40000">', '<ExternalLoads name="walk">']
+    lines.append("<objects>")
+    for name in SIDES:
+        side = name[0]
+        entries = {
+            "applied_to_body": f"calcn_{side}",
+            "force_expressed_in_body": "ground",
+            "point_expressed_in_body": "ground",
+            "force_identifier": f"ground_force_{side}_v",
+            "point_identifier": f"ground_force_{side}_p",
+            "torque_identifier": f"ground_torque_{side}_",
+        }
+        lines.append(f'<ExternalForce name="{name}">')
+        lines += [f"  <{entry}>{value}</{entry}>" for entry, value in entries.items()]
+        lines.append("</ExternalForce>")
+    lines += ["</objects>", f"<datafile>{forces}</datafile>", "</ExternalLoads>", "</OpenSimDocument>"]
+    return "\n".join(lines) + "\n"
 
 
 def opensim_coordinates(recording: Recording) -> dict[str, NDArray]:

@@ -6,7 +6,7 @@ strides.npz                     the 100 Hz series behind all of it
 every_stride.csv, .parquet      the curves of each stride
 gait.png, walk.gif              pictures
 stiffness_schedule.csv, finite_states.json   K and theta_eq as tables, which are policies again
-walk.mot, walk.sto, model.xml   the walk for OpenSim, the body for MuJoCo
+walk.mot, walk.sto, external_loads.xml, model.xml   the walk for OpenSim, the body for MuJoCo
 """
 
 import json
@@ -42,6 +42,7 @@ FILES = (
     "finite_states_right.json",
     "walk.mot",
     "walk.sto",
+    "external_loads.xml",
     "model.xml",
 )
 """Files of an evaluation, which has one or two tables of finite states, or none, and Parquet only with pyarrow."""

@@ -16,8 +16,8 @@ NAME = re.compile(
     r"(?:.*:)?(left|right|l|r)[ _]*(hip|knee|ankle|pelvis|toe|mtp)[ _]*(angle|moment)s?(?:[ _.:(]*x\)?)?", re.IGNORECASE
 )
 """Name of a column: side, joint, quantity, and perhaps the component X."""
-MOST_NM_PER_KG = 20.0
-"""Largest moment in N m/kg; a larger one is in N mm/kg; chosen, people's reach 2."""
+SMALLEST_NMM = 250.0
+"""Peak from which on moments are in N mm/kg; chosen: people's ankles reach 1,000 of them, or 150 N m."""
 
 
 def laboratory_curves(table: Table, side: str) -> dict[str, NDArray]:
@@ -33,7 +33,7 @@ def laboratory_curves(table: Table, side: str) -> dict[str, NDArray]:
             found[joint if is_angle else f"{joint}_moment"] = np.radians(values) if is_angle else values
     pelvis = found.pop("pelvis", None)
     moments = [name for name in found if name.endswith("_moment")]
-    if moments and max(np.abs(found[name]).max() for name in moments) > MOST_NM_PER_KG:
+    if moments and max(np.abs(found[name]).max() for name in moments) > SMALLEST_NMM:
         found |= {name: found[name] / 1000 for name in moments}
     turns_right = "knee" in found and found["knee"].mean() < 0  # as Visual3D counts
     if turns_right:

@@ -1,0 +1,266 @@
+"""Files in the form that the field writes: right ones are taken, each side for itself, wrong units are refused."""
+
+import numpy as np
+import pytest
+
+from springfoot.gait import GRAVITY, SpringfootError, human_gait
+from springfoot.gait.people.human import COLUMNS, FORCES
+from springfoot.gait.people.measurement import read_measurement
+from springfoot.gait.people.own_data import read_gait
+
+MASS = 71.0
+PHASE = np.linspace(0, 1, 101)
+JOINTS = {"hip": "hip_flexion", "knee": "knee_angle", "ankle": "ankle_angle", "toe": "mtp_angle"}
+RIGHT_SHARE = 0.8
+"""Knee and ankle moment of the right leg over those of the left, so that interchanged sides are seen."""
+
+
+def walk(speed):
+    """Time [s] and side -> curves, in the units of `HumanGait`."""
+    human = human_gait(speed)
+    time = 0.01 * np.arange(500)
+    legs = {}
+    for side, offset, share in (("left", 0.2, 1.0), ("right", 0.7, RIGHT_SHARE)):
+        legs[side] = {name: human.mean(name, time / human.stride_time + offset) for name in COLUMNS}
+        for name in ("knee", "ankle_moment"):
+            legs[side][name] = share * legs[side][name]
+    return time, legs
+
+
+def write(path, columns, head=(), separator="\t"):
+    """Write columns as text and return the path."""
+    rows = zip(*columns.values(), strict=True)
+    lines = [*head, separator.join(columns), *(separator.join(f"{value:.6g}" for value in row) for row in rows)]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+FORCE_NAMES = {
+    "AddBiomechanics": ("ground_force_calcn_r_v", "ground_force_calcn_l_v"),
+    "OpenCap": ("ground_force_right_v", "ground_force_left_v"),
+    "Rajagopal": ("ground_force_r_v", "ground_force_l_v"),
+    "gait2392": ("ground_force_v", "1_ground_force_v"),
+}
+
+
+def opensim(form, folder, *, speed=1.3, kinetic=True, degrees=True, says=None, paths=False, wrong=None):
+    """Write angles, forces and moments as people's tools do; `says` is the word for inDegrees, "" leaves the line out,
+    `wrong` maps beginnings or ends of columns to factors."""
+    time, legs = walk(speed)
+    unit = 180 / np.pi if degrees else 1.0
+    knee = -1.0 if form == "gait2392" else 1.0
+    says = ("yes" if degrees else "no") if says is None else says
+    head = [f"inDegrees={says}"] if says else []
+    path_of = "/jointset/joint/{}/value" if paths else "{}"
+    angles = {"pelvis_tilt": unit * (legs["left"]["thigh"] - legs["left"]["hip"]), "pelvis_tx": speed * time}
+    forces, moments = {}, {}
+    for side, start in zip(("right", "left"), FORCE_NAMES[form], strict=True):
+        curves = legs[side]
+        for joint, coordinate in JOINTS.items():
+            sign = knee if joint == "knee" else 1.0
+            still = joint == "toe" and form == "OpenCap"
+            name = f"{coordinate}_{side[0]}"
+            angles[name] = 0.0 * time if still else unit * sign * curves[joint]
+            moments[f"{name}_moment"] = -sign * MASS * curves.get(f"{joint}_moment", 0.0 * time)
+        for axis, force in (("y", "grf_vertical"), ("x", "grf_forward")):
+            forces[f"{start}{axis}"] = MASS * GRAVITY * curves[force]
+        forces[f"{start[:-1]}px"] = speed * time
+    for end, factor in (wrong or {}).items():
+        for columns in (angles, forces, moments):
+            columns |= {
+                name: factor * values for name, values in columns.items() if name.startswith(end) or name.endswith(end)
+            }
+    angles = {path_of.format(name): values for name, values in angles.items()}
+    files = [write(folder / "ik.mot", {"time": time} | angles, ["Coordinates", *head, "endheader"])]
+    if kinetic:
+        files.append(write(folder / "grf.mot", {"time": time} | forces, ["nRows=500", "endheader"]))
+        files.append(write(folder / "id.sto", {"time": time} | moments, ["nRows=500", "inDegrees=no", "endheader"]))
+    return files
+
+
+def visual3d(folder, *, speed=1.3, kinetic=True, rows=None, angle=1.0, moment=1.0):
+    """Write Visual3D's text: over time, or with `rows` mean curves over the stride."""
+    time, legs = walk(speed)
+    columns = {} if rows else {"TIME": time}
+    for side, curves in legs.items():
+        if rows:
+            human, share = human_gait(speed), RIGHT_SHARE if side == "right" else 1.0
+            curves = {name: human.mean(name, np.linspace(0, 1, rows)) for name in COLUMNS}
+            curves |= {name: share * curves[name] for name in ("knee", "ankle_moment")}
+        for joint in ("hip", "knee", "ankle"):
+            sign = -1.0 if joint == "knee" else 1.0
+            columns[f"{side.upper()}_{joint.upper()}_ANGLE"] = sign * angle * np.degrees(curves[joint])
+            if kinetic:
+                columns[f"{side.upper()}_{joint.upper()}_MOMENT"] = -sign * moment * curves[f"{joint}_moment"]
+    names = list(columns)
+    x = ["0" if name == "TIME" else "X" for name in names]
+    heads = [["walk.c3d"] * len(names), names, ["LINK_MODEL_BASED"] * len(names), ["ORIGINAL"] * len(names), x]
+    lines = ["\t".join(["ITEM" if index == 4 else "", *head]) for index, head in enumerate(heads)]
+    lines += [
+        "\t".join([str(k + 1), *(f"{v:.6g}" for v in row)]) for k, row in enumerate(zip(*columns.values(), strict=True))
+    ]
+    (folder / "export.txt").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return [folder / "export.txt"]
+
+
+def plug_in_gait(folder, *, speed=1.3, kinetic=True, angle=1.0, moment=1.0, separator=","):
+    """Write a table with Plug-in Gait's names, angles in degrees, moments in N mm/kg."""
+    time, legs = walk(speed)
+    columns = {"time_s": time}
+    for side, curves in legs.items():
+        letter = side[0].upper()
+        columns[f"{letter}PelvisAngles"] = angle * np.degrees(curves["hip"] - curves["thigh"])
+        for joint in ("hip", "knee", "ankle"):
+            columns[f"{letter}{joint.capitalize()}Angles"] = angle * np.degrees(curves[joint])
+            if kinetic:
+                columns[f"{letter}{joint.capitalize()}Moment"] = 1000 * moment * curves[f"{joint}_moment"]
+    path = write(folder / "pig.csv", columns, separator=separator)
+    if separator == ";":
+        path.write_text(path.read_text().replace(".", ","), encoding="utf-8")
+    return [path]
+
+
+SPEEDS = (0.9, 1.3, 1.7)
+RIGHT = {
+    **{f"{form} at {v}": (opensim, form, {"speed": v}) for form in FORCE_NAMES for v in SPEEDS},
+    **{f"{form}, angles alone": (opensim, form, {"kinetic": False}) for form in FORCE_NAMES},
+    **{f"{form} in radians": (opensim, form, {"degrees": False}) for form in FORCE_NAMES},
+    **{f"{form} says nothing of degrees": (opensim, form, {"says": ""}) for form in FORCE_NAMES},
+    **{f"{form} says nothing of radians": (opensim, form, {"says": "", "degrees": False}) for form in FORCE_NAMES},
+    **{f"{form} with paths": (opensim, form, {"paths": True}) for form in FORCE_NAMES},
+    **{f"Visual3D at {v}": (visual3d, None, {"speed": v}) for v in SPEEDS},
+    "Visual3D, angles alone": (visual3d, None, {"kinetic": False}),
+    "Visual3D, 101 rows a stride": (visual3d, None, {"rows": 101}),
+    "Visual3D, 51 rows a stride": (visual3d, None, {"rows": 51}),
+    **{f"Plug-in Gait at {v}": (plug_in_gait, None, {"speed": v}) for v in SPEEDS},
+    "Plug-in Gait, angles alone": (plug_in_gait, None, {"kinetic": False}),
+    "Plug-in Gait in N m/kg": (plug_in_gait, None, {"moment": 1e-3}),
+    "Plug-in Gait, external moments": (plug_in_gait, None, {"moment": -1.0}),
+    "Plug-in Gait, semicolons and decimal commas": (plug_in_gait, None, {"separator": ";"}),
+    "Plug-in Gait, tabs": (plug_in_gait, None, {"separator": "\t"}),
+}
+
+
+def written(case, folder):
+    maker, form, options = case
+    return maker(form, folder, **options) if form else maker(folder, **options)
+
+
+@pytest.mark.parametrize("case", RIGHT.values(), ids=RIGHT)
+def test_right_files_are_taken_each_side_for_itself(case, tmp_path):
+    measured = read_measurement(written(case, tmp_path))
+    options = case[2]
+    human = human_gait(options.get("speed", 1.3))
+    for side, share in (("left", 1.0), ("right", RIGHT_SHARE)):
+        leg = measured.legs[side]
+        knee = leg.counted("knee").mean(axis=0)
+        # Events found in angles alone are a percent or two of the stride off.
+        assert np.degrees(np.abs(knee - share * human.mean("knee", PHASE))).mean() < 2.0
+        assert np.ptp(knee) == pytest.approx(share * np.ptp(human.mean("knee", PHASE)), rel=0.05)
+        assert ("ankle_moment" in leg.curves) == options.get("kinetic", True)
+        if "ankle_moment" in leg.curves:
+            assert np.abs(leg.counted("ankle_moment")).mean(axis=0).max() == pytest.approx(
+                share * human.mean("ankle_moment", PHASE).max(), rel=0.06
+            )
+        assert ("toe" in leg.curves) == (case[1] not in (None, "OpenCap"))
+    told = " ".join(measured.notes)
+    assert ("right toe left out: it is 0 throughout" in told) == (case[1] == "OpenCap")
+    assert ("does not say inDegrees" in told) == (options.get("says") == "")
+    if case[1] and options.get("kinetic", True):
+        assert measured.mass == pytest.approx(MASS, rel=0.06) and measured.mass_from.startswith("from the forces")
+
+
+def times(**factors):
+    return {"wrong": factors}
+
+
+FLIPPED = times(ankle_angle=-1.0, ankle_angle_r_moment=-1.0, ankle_angle_l_moment=-1.0)
+BODY_WEIGHTS = times(vy=1 / MASS / GRAVITY, vx=1 / MASS / GRAVITY)
+OF_OPENSIM = {
+    "degrees as radians": ({"says": "no"}, "degrees or radians?"),
+    "radians as degrees": ({"degrees": False, "says": "yes"}, "radians?"),
+    "forces in body weights": (BODY_WEIGHTS, "are they in N?"),
+    "moments in N mm": (times(_moment=1e3), "N mm"),
+    "moments per kg": (times(_moment=1 / MASS), "times as far as people's"),
+    "a flipped ankle": (FLIPPED, "opposite"),
+}
+WRONG = {
+    **{f"{form}: {name}": (opensim, form, *case) for form in FORCE_NAMES for name, case in OF_OPENSIM.items()},
+    "one knee flipped": (opensim, "gait2392", times(knee_angle_r_moment=-1.0), "knee_moment"),
+    "flipped hips": (opensim, "Rajagopal", times(hip_flexion_r=-1.0, hip_flexion_l=-1.0), "behind at heel strike"),
+    "the pelvis in mm": (opensim, "OpenCap", times(pelvis_tx=1e3), "speed"),
+    "forces downward": (opensim, "AddBiomechanics", times(vy=-1.0), "up must be positive"),
+    "Visual3D: radians": (visual3d, None, {"angle": np.pi / 180}, "radians?"),
+    "Visual3D: moments in N m": (visual3d, None, {"moment": MASS}, "N m, not per kg?"),
+    "Visual3D: mean curves in radians": (visual3d, None, {"angle": np.pi / 180, "rows": 101}, "radians?"),
+    "Plug-in Gait: radians": (plug_in_gait, None, {"angle": np.pi / 180}, "radians?"),
+    "Plug-in Gait: moments in N mm": (plug_in_gait, None, {"moment": MASS}, "N m, not per kg?"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG.values(), ids=WRONG)
+def test_wrong_units_and_signs_are_refused_with_a_guess(case, tmp_path):
+    *maker, guess = case
+    with pytest.raises(SpringfootError) as caught:
+        read_measurement(written(maker, tmp_path))
+    assert guess in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_there_are_as_many_right_and_wrong_files_as_were_asked_for():
+    assert len(RIGHT) >= 40 and len(WRONG) >= 25
+
+
+def test_forces_of_the_other_foot_are_noticed(tmp_path):
+    files = opensim("OpenCap", tmp_path)
+    text = files[1].read_text()
+    files[1].write_text(
+        text.replace("force_right", "force_r0").replace("force_left", "force_right").replace("force_r0", "force_left")
+    )
+    with pytest.raises(SpringfootError, match=r"interchanged|other foot"):
+        read_measurement(files)
+
+
+def test_other_names_of_columns_are_named(tmp_path):
+    files = opensim("Rajagopal", tmp_path)
+    files[0].write_text(files[0].read_text().replace("knee_angle_r", "Knee R"))
+    named = read_measurement(files, columns={"knee_angle_r": "Knee R"})
+    assert "knee" in named.legs["right"].curves
+    for columns, words in (
+        ({"knee_angle_r": "Knee Q"}, "no column 'Knee Q' in a text file; there are time, pelvis_tilt"),
+        ({"knee_angel_r": "Knee R"}, "'knee_angel_r' is no column that is read here; perhaps knee_angle_r"),
+    ):
+        with pytest.raises(SpringfootError, match=words):
+            read_measurement(files, columns=columns)
+
+
+def test_a_grid_of_two_percent_gives_the_curves_between(tmp_path):
+    human, percent = human_gait(1.3), np.arange(0, 101, 2)
+    columns = {"percent": percent, "toe_off_percent": np.full(51, 100 * human.toe_off)}
+    for name in ("knee", "ankle", "ankle_moment", "grf_vertical"):
+        unit = 180 / np.pi if COLUMNS[name].endswith("_deg") else 1.0
+        columns[COLUMNS[name]] = unit * human.mean(name, percent / 100)
+    gait = read_gait(write(tmp_path / "grid.csv", columns, separator=",")).gait(1.3, 1.7)
+    assert np.degrees(np.abs(gait.mean("knee", PHASE) - human.mean("knee", PHASE))).max() < 0.5
+    assert np.abs(gait.mean("ankle_moment", PHASE) - human.mean("ankle_moment", PHASE)).max() < 0.02
+
+
+def test_strides_off_the_force_plate_count_for_angles_alone(tmp_path):
+    files = opensim("Rajagopal", tmp_path)
+    lines = files[1].read_text().splitlines()
+    # Without force after 3 s: inverse dynamics there means nothing.
+    cut = [
+        line if k < 303 or not line[:1].isdigit() else "\t".join([line.split("\t")[0], *["0"] * 6])
+        for k, line in enumerate(lines)
+    ]
+    files[1].write_text("\n".join(cut) + "\n")
+    leg = read_measurement(files).legs["left"]
+    assert len(leg.counted("ankle_moment")) == leg.weighed.sum() == len(leg.counted("grf_vertical"))
+
+
+def test_the_mass_that_was_given_and_the_one_the_forces_bear(tmp_path):
+    measured = read_measurement(opensim("Rajagopal", tmp_path), mass=90.0)
+    assert measured.mass == 90.0 and any("The forces bear 7" in note and "not 90" in note for note in measured.notes)
+    alone = read_measurement([tmp_path / "ik.mot", tmp_path / "id.sto"])
+    assert alone.mass is None and any("--mass" in note for note in alone.notes)
+    weighed = read_measurement([tmp_path / "ik.mot", tmp_path / "id.sto"], mass=MASS)
+    assert "ankle_moment" in weighed.legs["left"].curves and FORCES[0] not in weighed.legs["left"].curves

@@ -1,0 +1,151 @@
+"""The command `springfoot person`: planted truth comes back, its files are read again, bad input is one line."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+from springfoot.cli.main import main
+from springfoot.envs.settings.settings import body_of
+from springfoot.evaluation.numbers.series import GAIT_CYCLE_COLUMNS, foot_contacts, stride_curves, strides_within
+from springfoot.evaluation.recording.policies import policy_and_settings
+from springfoot.evaluation.recording.recording import record
+from springfoot.evaluation.report.exports import write_opensim
+from springfoot.gait import human_gait
+from springfoot.gait.people.human import COLUMNS
+from springfoot.gait.people.own_data import read_gait
+
+PHASE = np.linspace(0, 1, 101)
+FILES = ("report.md", "quasi_stiffness.csv", "curves.csv", "schedule.csv", "finite_states.json")
+PICTURES = ("curves.png", "torque_angle.png")
+
+
+def rows_of(path):
+    """Return the rows of a CSV file."""
+    with path.open(encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def slope_of(angle, moment, row):
+    """Return the slope of a curve (101,) in the phase of a row of quasi_stiffness.csv."""
+    at = np.linspace(float(row["from_percent"]), float(row["to_percent"]), 101) / 100
+    return np.polyfit(np.interp(at, PHASE, angle), np.interp(at, PHASE, moment), 1)[0]
+
+
+PLANTED = {
+    "schedule": ("schedule", {}),
+    "flat": ("constant:300,40", {}),
+    "soft toe": ("constant:300,20", {}),
+    "right foot passive": ("schedule", {"right_foot": "passive"}),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("policy", "given"), PLANTED.values(), ids=PLANTED)
+def test_planted_truth_comes_back(policy, given, tmp_path, capsys):
+    act, settings = policy_and_settings(policy, {"episode_seconds": 14.0} | given)
+    recording = record(act, settings, name=policy, episodes=1)
+    write_opensim(tmp_path, recording)
+    words = [str(tmp_path / "walk.mot"), str(tmp_path / "walk.sto"), "--out", str(tmp_path / "me")]
+    assert main(["person", *words]) == 0
+    body, series = body_of(settings), recording.shown()
+    contacts = foot_contacts(series["force"][..., 1].sum(axis=-1), body)
+    rows = rows_of(tmp_path / "me" / "quasi_stiffness.csv")
+    compared, values = 0, {}
+    for index, side in enumerate(("left", "right")):
+        strides = strides_within(contacts[index], (0.0, 14.0))
+        curves = stride_curves(series, index, body, strides).mean(axis=0)
+        curve = dict(zip(GAIT_CYCLE_COLUMNS, curves.T, strict=True))
+        for joint, name in (("ankle", "ankle"), ("toe", "mtp")):
+            angle, moment = np.radians(curve[f"{name}_dorsiflexion_deg"]), curve[f"{name}_moment_Nm_per_kg"]
+            for row in rows:
+                if (row["joint"], row["side"]) == (joint, side) and row["quasi_stiffness"]:
+                    truth = body.total_mass * slope_of(angle, moment, row)
+                    found = float(row["quasi_stiffness"])
+                    print(f"{policy} {given}: {side} {joint}, {row['phase']}: {truth:.1f}, read {found:.1f}")
+                    # The toe of a flat foot hardly bears: 0.5 N m/rad is the noise of a slope near 0.
+                    assert found == pytest.approx(truth, rel=0.05, abs=0.5)
+                    values[side, joint, row["phase"]] = found
+                    compared += 1
+    assert compared >= 12
+    rising = [values[side, "ankle", "early rising"] for side in ("left", "right")]
+    assert rising[1] > 2 * rising[0] if given else rising[1] == pytest.approx(rising[0], rel=0.15)
+    assert "95 % interval over strides" in capsys.readouterr().out
+
+
+@pytest.fixture(scope="module")
+def mine(tmp_path_factory):
+    """Mean curves of somebody over percent, the right ankle's moment less."""
+    human = human_gait(1.3)
+    columns = {"percent": 100 * PHASE, "speed_m_s": np.full(101, 1.3), "toe_off_percent": np.full(101, 62.0)}
+    for name in ("thigh", "knee", "ankle", "ankle_moment", "grf_vertical"):
+        unit = 180 / np.pi if COLUMNS[name].endswith("_deg") else 1.0
+        for side, share in (("left", 1.0), ("right", 0.8 if name == "ankle_moment" else 1.0)):
+            columns[f"{COLUMNS[name]}_{side}"] = unit * share * human.mean(name, PHASE)
+    lines = [",".join(columns), *(",".join(f"{v:.6g}" for v in row) for row in zip(*columns.values(), strict=True))]
+    path = tmp_path_factory.mktemp("mine") / "mine.csv"
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+def test_every_file_is_written_and_read_again(mine, tmp_path, capsys):
+    out = tmp_path / "me"
+    assert main(["person", str(mine), "--mass", "71", "--train", "runs/me", "--out", str(out)]) == 0
+    told = capsys.readouterr().out
+    assert {path.name for path in out.iterdir()} == {*FILES, *PICTURES}
+    for words in (
+        "springfoot train --human",
+        "no property of a spring",
+        "Without intervals",
+        "Mass: 71.0 kg, as given",
+    ):
+        assert words in told
+    assert "Borrowed from the norm: stride time, step length, hip, toe," in told
+    assert told.strip().startswith((out / "report.md").read_text(encoding="utf-8").partition("\n\nMade by")[0])
+    own = read_gait(out / "curves.csv").gait(1.3, 1.7)
+    human = human_gait(1.3)
+    np.testing.assert_allclose(own.mean("knee", PHASE), human.mean("knee", PHASE), atol=1e-4)
+    np.testing.assert_allclose(own.mean("ankle_moment", PHASE), 0.9 * human.mean("ankle_moment", PHASE), atol=1e-3)
+    rows = {(row["side"], row["phase"]): row for row in rows_of(out / "quasi_stiffness.csv")}
+    left, right, norm = (float(rows[side, "late rising"]["quasi_stiffness"]) for side in ("left", "right", "norm"))
+    assert right == pytest.approx(0.8 * left, rel=1e-4) and left == pytest.approx(norm, rel=0.02)
+    for name in ("schedule.csv", "finite_states.json"):
+        _, settings = policy_and_settings(str(out / name), {"mass": 71.0})
+        stiffness, _ = settings.schedule.at(0.4)
+        assert settings.equilibrium == "phase" and 200 < stiffness[0] < 900
+    states = json.loads((out / "finite_states.json").read_text(encoding="utf-8"))
+    assert [state["name"] for state in states["states"]] == ["loading", "mid-stance", "push-off", "swing"]
+    assert all(path.stat().st_size > 10_000 for path in (out / name for name in PICTURES))
+
+
+def test_one_side_alone_and_no_mass(mine, tmp_path, capsys):
+    assert main(["person", str(mine), "--side", "right", "--out", str(tmp_path / "me")]) == 0
+    told = capsys.readouterr().out
+    assert "| quasi-stiffness, N·m/(rad·kg) | right | norm |" in told and "Mass: unknown" in told
+
+
+@pytest.mark.parametrize(
+    ("words", "error"),
+    [
+        ([], "FILE"),
+        (["none.csv"], "no file none.csv"),
+        (["MINE", "--columns", "knee"], "--columns must be OURS=THEIRS, such as knee_angle_r=KneeRight, got 'knee'"),
+        (["MINE", "--columns", "percent=a", "--columns", "percent=b"], "names one of our columns twice"),
+        (["MINE", "--columns", "percent=a"], "no column 'a' in a text file; there are percent"),
+        (["MINE", "--mass", "1"], "mass"),
+        (["MINE", "--speed", "9"], "speed"),
+        (["MINE", "--height", "9"], "height"),
+        (["MINE", "--mass", "60", "--mass", "70"], "--mass is given twice"),
+        (["MINE", "--columns", "mtp_dorsiflexion_deg_left=ankle_dorsiflexion_deg_left", "--side", "left"], "no ankle angle"),
+    ],
+)
+def test_bad_input_is_one_line(words, error, mine, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    try:
+        code = main(["person", *(str(mine) if word == "MINE" else word for word in words)])
+    except SystemExit as end:
+        code = end.code
+    told = capsys.readouterr().err
+    assert code == 2 and error in told and told.count("\n") == 1, told
+    assert list(tmp_path.iterdir()) == []
