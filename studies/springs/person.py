@@ -84,7 +84,7 @@ class Person(Study):
     Writes the person's curves beside people's, and a schedule of stiffness that `springfoot evaluate` walks.
     """
 
-    files: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="FILE ...")]
+    files: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="FILE ...", help_behavior_hint="")]
     """Motion files of one walk: CSV, OpenSim's .mot and .sto, .c3d, Visual3D's .txt; FILE:CONDITION for one of several
     in a CSV. docs/how-to/own-data.md says what is read."""
     mass: float | None = None
