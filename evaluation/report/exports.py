@@ -38,7 +38,11 @@ def external_loads(forces: str) -> str:
 
     These are the rear feet of its models of walking.
     """
-    lines = ['<?xml version="1.0" encoding="UTF-8"?>', '<OpenSimDocument Version="40000">', '<ExternalLoads name="walk">']
+    lines = [
+        '<?xml version="1.0" encoding="UTF-8"?>',
+        '<OpenSimDocument Version="40000">',
+        '<ExternalLoads name="walk">',
+    ]
     lines.append("<objects>")
     for name in SIDES:
         side = name[0]

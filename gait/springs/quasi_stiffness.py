@@ -20,8 +20,8 @@ from .stiffness import ankle_events, toe_events
 
 SMALLEST_TURN = np.radians(2.0)
 """Least excursion of the angle in a phase for a slope over it to mean something [rad]; chosen."""
-SLOPE_STEP = 0.005
-"""Time between the samples of a slope [strides]; chosen."""
+SLOPE_STEP = 0.0005
+"""Time between the samples of a slope [strides]; chosen: with 0.005 the ends of a phase weigh too much, up to 5 %."""
 
 
 class StancePhase(NamedTuple):

@@ -29,7 +29,7 @@ def rows_of(path):
 
 def slope_of(angle, moment, row):
     """Return the slope of a curve (101,) in the phase of a row of quasi_stiffness.csv."""
-    at = np.linspace(float(row["from_percent"]), float(row["to_percent"]), 101) / 100
+    at = np.linspace(float(row["from_percent"]), float(row["to_percent"]), 2001) / 100
     return np.polyfit(np.interp(at, PHASE, angle), np.interp(at, PHASE, moment), 1)[0]
 
 
