@@ -9,8 +9,8 @@ from springfoot.lazy import lazy_names
 if TYPE_CHECKING:
     from .gait_events import CONTACT_THRESHOLD_BW, PERCENT, Contacts, find_contacts, find_steps, on_percent, sample
     from .human import COLUMNS, HumanGait, human_gait
-    from .measurement import Measurement, read_measurement
-    from .motion_files import MEASURED
+    from .measured_person import MeasuredPerson, read_person
+    from .motion_files import FILE_CURVES
     from .own_data import read_gait
     from .scores import (
         LOADING_END_PERCENT,
@@ -26,14 +26,14 @@ if TYPE_CHECKING:
 __all__ = [
     "COLUMNS",
     "CONTACT_THRESHOLD_BW",
+    "FILE_CURVES",
     "FILTER",
     "LOADING_END_PERCENT",
-    "MEASURED",
     "PERCENT",
     "PUSH_OFF_BEGIN_PERCENT",
     "Contacts",
     "HumanGait",
-    "Measurement",
+    "MeasuredPerson",
     "correlation",
     "find_contacts",
     "find_steps",
@@ -42,7 +42,7 @@ __all__ = [
     "mean_sd",
     "on_percent",
     "read_gait",
-    "read_measurement",
+    "read_person",
     "rmse",
     "sample",
     "stride_work",
@@ -54,9 +54,9 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
         {
             "COLUMNS": "human",
             "FILTER": "strides",
-            "MEASURED": "motion_files",
-            "Measurement": "measurement",
-            "read_measurement": "measurement",
+            "FILE_CURVES": "motion_files",
+            "MeasuredPerson": "measured_person",
+            "read_person": "measured_person",
             "CONTACT_THRESHOLD_BW": "gait_events",
             "LOADING_END_PERCENT": "scores",
             "PERCENT": "gait_events",

@@ -23,7 +23,7 @@ from .gait_events import Contacts
 from .human import COLUMNS, FORCES
 from .laboratory_names import laboratory_curves
 
-MEASURED = COLUMNS | {"toe_moment": "mtp_moment_Nm_per_kg"}
+FILE_CURVES = COLUMNS | {"toe_moment": "mtp_moment_Nm_per_kg"}
 """Curve that a file may have -> its column in CSV files: those of `HumanGait`, and the toe's moment, plantarflexion
 positive, which of people is unknown."""
 LONGEST_HEADER = 200
@@ -79,12 +79,12 @@ def csv_trial(table: Table) -> Trial:
 
 
 def our_columns(table: Table, suffix: str = "") -> Series:
-    """Return the curves of a table's columns named as in `MEASURED` with `suffix` behind (as `_sd`), in SI units.
+    """Return the curves of a table's columns named as in `FILE_CURVES` with `suffix` behind (as `_sd`), in SI units.
 
     A missing thigh is computed from hip and pelvis. `_left` and `_right` also bring a laboratory's names.
     """
     curves = laboratory_curves(table, suffix[1:]) if suffix[1:] in FILE_SIDES else {}
-    for name, column in MEASURED.items():
+    for name, column in FILE_CURVES.items():
         if table.has(column + suffix):
             values = table.numbers(column + suffix)
             curves[name] = np.radians(values) if column.endswith("_deg") else values
@@ -122,7 +122,9 @@ def known_columns() -> set[str]:
     """Return all names of columns that the readers of text files know, but for those of laboratories."""
     known = {*TIME_COLUMNS, "percent", *PARAMETERS.values(), "toe_off_percent", "n", "condition"}
     sides = ("", *(f"_{side}" for side in FILE_SIDES))
-    known |= {f"{column}{side}{sd}" for column in (*MEASURED.values(), PELVIS) for side in sides for sd in ("", "_sd")}
+    known |= {
+        f"{column}{side}{sd}" for column in (*FILE_CURVES.values(), PELVIS) for side in sides for sd in ("", "_sd")
+    }
     known |= {"pelvis_tilt", "pelvis_tx"}
     known |= {f"{coordinate}_{side}{end}" for coordinate in _OPENSIM for side in "lr" for end in ("", "_moment")}
     return known | {f"{start}{axis}" for starts in _OPENSIM_FORCE.values() for start in starts for axis in "xy"}

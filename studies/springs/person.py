@@ -24,7 +24,7 @@ from springfoot.files.markdown import MISSING, table, text_of
 from springfoot.files.writing import csv_text
 from springfoot.gait import Body, HumanGait, human_gait, schedule_from_curves
 from springfoot.gait.body import REFERENCE_HEIGHT, REFERENCE_MASS, TOE_STIFFNESS
-from springfoot.gait.people import FILTER, MEASURED, PERCENT, Measurement, read_measurement
+from springfoot.gait.people import FILE_CURVES, FILTER, PERCENT, MeasuredPerson, read_person
 from springfoot.gait.springs import (
     LOWEST_STIFFNESS,
     SPRINGS,
@@ -58,7 +58,7 @@ STATE_NAMES = {
     "toe-off": "swing",
 }
 """Event at which a finite state begins -> its name."""
-EVENTS = {
+SPRING_EVENTS = {
     "ankle": ("heel strike", "foot flat", "maximum dorsiflexion of the ankle", "toe-off"),
     "toe": ("heel strike", "heel-off", "maximum dorsiflexion of the toe", "toe-off"),
 }
@@ -122,11 +122,11 @@ class Person(Study):
         """Read the files, and put the person beside people."""
         return _Sheet(self, self._read()).answer()
 
-    def _read(self) -> Measurement:
+    def _read(self) -> MeasuredPerson:
         """Return the person's walk."""
         named = [files_of(words) for words in self.files]
         condition = named[0][1] if len(named) == 1 else None
-        return read_measurement(
+        return read_person(
             [file for files, _ in named for file in files],
             condition=condition,
             side=self.side,
@@ -140,7 +140,7 @@ class Person(Study):
 class _Sheet:
     """What is said of one person."""
 
-    def __init__(self, asked: Person, measured: Measurement):
+    def __init__(self, asked: Person, measured: MeasuredPerson):
         self._asked = asked
         self._measured = measured
         self._speed = measured.gait.speed or USUAL_SPEED
@@ -149,7 +149,7 @@ class _Sheet:
         self._gait: HumanGait = measured.gait.gait(self._speed, asked.height)
         if not any("ankle" in leg.curves for leg in measured.legs.values()):
             raise SpringfootError(
-                f"{measured.gait.name}: no ankle angle, such as {MEASURED['ankle']} or ankle_angle_r; "
+                f"{measured.gait.name}: no ankle angle, such as {FILE_CURVES['ankle']} or ankle_angle_r; "
                 "--columns names it if it is called otherwise"
             )
 
@@ -237,7 +237,7 @@ class _Sheet:
     def _drawn(self) -> dict[str, dict[str, NDArray]]:
         """Return side -> curve -> its mean (101,)."""
         return {
-            side or "both": {name: leg.counted(name).mean(axis=0) for name in MEASURED if _has(leg, name)}
+            side or "both": {name: leg.counted(name).mean(axis=0) for name in FILE_CURVES if _has(leg, name)}
             for side, leg in self._measured.legs.items()
         }
 
@@ -261,7 +261,7 @@ class _Sheet:
         numbers = {name: value for name, value in numbers.items() if value is not None}
         columns: dict[str, NDArray] = {}
         phase = PERCENT / 100
-        for name, column in MEASURED.items():
+        for name, column in FILE_CURVES.items():
             unit = np.degrees(1.0) if column.endswith("_deg") else 1.0
             if name in gait.mean:
                 columns[column] = unit * self._gait.mean(name, phase)
@@ -439,7 +439,7 @@ def _events(gait: HumanGait, joint: str) -> dict[float, str]:
     phase = np.linspace(0.0, gait.toe_off, 1001)
     find = ankle_events if joint == "ankle" else toe_events
     times = find(phase, gait.mean(joint, phase), gait.toe_off).values()
-    return {round(time, 6): name for time, name in zip(times, EVENTS[joint], strict=True)}
+    return {round(time, 6): name for time, name in zip(times, SPRING_EVENTS[joint], strict=True)}
 
 
 def _has(leg: Any, name: str) -> bool:

@@ -14,9 +14,9 @@ from springfoot.gait import HumanGait
 from springfoot.gait.people import PERCENT
 from springfoot.gait.springs import SPRINGS
 
-COLOURS = {"left": "#0b6e8f", "right": "#c77800", "both": "#0b6e8f"}
+SIDE_COLOURS = {"left": "#0b6e8f", "right": "#c77800", "both": "#0b6e8f"}
 """Side -> its colour."""
-PANELS = (
+CURVE_PANELS = (
     ("hip", "knee", "ankle", "toe"),
     ("hip_moment", "knee_moment", "ankle_moment", "toe_moment"),
 )
@@ -29,7 +29,7 @@ def draw_curves(path: Path, sheet: Sheet, norm: HumanGait) -> None:
     """Draw angles and moments over the stride into the picture `path`, the norm's mean ± SD behind them."""
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(11.0, 5.2), layout="constrained")
-        for axes, names in zip(figure.subplots(2, len(PANELS[0]), sharex=True), PANELS, strict=True):
+        for axes, names in zip(figure.subplots(2, len(CURVE_PANELS[0]), sharex=True), CURVE_PANELS, strict=True):
             for ax, name in zip(axes, names, strict=True):
                 is_angle = not name.endswith("_moment")
                 unit = np.degrees(1.0) if is_angle else 1.0
@@ -39,10 +39,10 @@ def draw_curves(path: Path, sheet: Sheet, norm: HumanGait) -> None:
                     ax.plot(PERCENT, mean, color=PEOPLE, lw=1.2, label="norm ± SD")
                 for side, curves in sheet.items():
                     if name in curves:
-                        ax.plot(PERCENT, unit * curves[name], color=COLOURS[side], lw=1.6, label=side)
+                        ax.plot(PERCENT, unit * curves[name], color=SIDE_COLOURS[side], lw=1.6, label=side)
                 ax.set_title(f"{name.replace('_', ' ').capitalize()}, {'deg' if is_angle else 'N·m/kg'}")
                 _finish(ax)
-        for ax in figure.axes[-len(PANELS[0]) :]:
+        for ax in figure.axes[-len(CURVE_PANELS[0]) :]:
             ax.set_xlabel("stride (%)")
         _legend(figure)
         figure.savefig(path, dpi=110, **PNG)
@@ -62,7 +62,7 @@ def draw_loops(path: Path, sheet: Sheet, norm: HumanGait, starts: Mapping[tuple[
                     continue
                 at = np.linspace(bounds[0], bounds[-1], 200)
                 angle, moment = (curves[name] for name in (joint, f"{joint}_moment"))
-                colour = COLOURS.get(side, PEOPLE)
+                colour = SIDE_COLOURS.get(side, PEOPLE)
                 ax.plot(*_point(at, angle, moment), color=colour, lw=1.5, label=side)
                 ax.plot(*_point(bounds, angle, moment), "o", color=colour, ms=3.5)
             ax.set(title=f"{joint.capitalize()}, stance", xlabel="angle (deg)", ylabel="moment (N·m/kg)")

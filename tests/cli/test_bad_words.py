@@ -43,7 +43,7 @@ EVALUATE = [
     (["--drawn-feet", '[{"foot": "rigd"}]'], "drawn_feet[0] must be one of 'intact', 'rigid', 'rigid_toe', 'no_toe', 'passive', 'adaptive', 'weak', 'drop', got 'rigd'; perhaps rigid?"),
     (["--drawn-bodies", '[{"leg_ratio": 2}]'], "drawn_bodies[0]: leg_ratio must be in [0.94, 1.06] (relative), got 2"),
     (["--schedule", '{"ankle": ' + "[" * 100_000], "--schedule must be JSON, but it is nested too deeply: '{\"ankle\": [[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[[..."),
-    (["--human", "None"], "None must be a .csv, .mot, .sto or .c3d file"),
+    (["--human", "None"], "None must be a .csv, .txt, .mot, .sto or .c3d file"),
     (["--human", "n" * 240 + ".csv"], f"no file {'n' * 78}...{'n' * 74}.csv"),
     (["--out", "o" * 400], f"File name too long: {'o' * 78}...{'o' * 78}"),
     (["--out"], "--out needs a value"),

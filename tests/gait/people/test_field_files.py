@@ -5,7 +5,7 @@ import pytest
 
 from springfoot.gait import GRAVITY, SpringfootError, human_gait
 from springfoot.gait.people.human import COLUMNS, FORCES
-from springfoot.gait.people.measurement import read_measurement
+from springfoot.gait.people.measured_person import read_person
 from springfoot.gait.people.own_data import read_gait
 
 MASS = 71.0
@@ -148,7 +148,7 @@ def written(case, folder):
 
 @pytest.mark.parametrize("case", RIGHT.values(), ids=RIGHT)
 def test_right_files_are_taken_each_side_for_itself(case, tmp_path):
-    measured = read_measurement(written(case, tmp_path))
+    measured = read_person(written(case, tmp_path))
     options = case[2]
     human = human_gait(options.get("speed", 1.3))
     for side, share in (("left", 1.0), ("right", RIGHT_SHARE)):
@@ -202,7 +202,7 @@ WRONG = {
 def test_wrong_units_and_signs_are_refused_with_a_guess(case, tmp_path):
     *maker, guess = case
     with pytest.raises(SpringfootError) as caught:
-        read_measurement(written(maker, tmp_path))
+        read_person(written(maker, tmp_path))
     assert guess in str(caught.value) and "\n" not in str(caught.value)
 
 
@@ -217,20 +217,20 @@ def test_forces_of_the_other_foot_are_noticed(tmp_path):
         text.replace("force_right", "force_r0").replace("force_left", "force_right").replace("force_r0", "force_left")
     )
     with pytest.raises(SpringfootError, match=r"interchanged|other foot"):
-        read_measurement(files)
+        read_person(files)
 
 
 def test_other_names_of_columns_are_named(tmp_path):
     files = opensim("Rajagopal", tmp_path)
     files[0].write_text(files[0].read_text().replace("knee_angle_r", "Knee R"))
-    named = read_measurement(files, columns={"knee_angle_r": "Knee R"})
+    named = read_person(files, columns={"knee_angle_r": "Knee R"})
     assert "knee" in named.legs["right"].curves
     for columns, words in (
         ({"knee_angle_r": "Knee Q"}, "no column 'Knee Q' in a text file; there are time, pelvis_tilt"),
         ({"knee_angel_r": "Knee R"}, "'knee_angel_r' is no column that is read here; perhaps knee_angle_r"),
     ):
         with pytest.raises(SpringfootError, match=words):
-            read_measurement(files, columns=columns)
+            read_person(files, columns=columns)
 
 
 def test_a_grid_of_two_percent_gives_the_curves_between(tmp_path):
@@ -253,14 +253,14 @@ def test_strides_off_the_force_plate_count_for_angles_alone(tmp_path):
         for k, line in enumerate(lines)
     ]
     files[1].write_text("\n".join(cut) + "\n")
-    leg = read_measurement(files).legs["left"]
+    leg = read_person(files).legs["left"]
     assert len(leg.counted("ankle_moment")) == leg.weighed.sum() == len(leg.counted("grf_vertical"))
 
 
 def test_the_mass_that_was_given_and_the_one_the_forces_bear(tmp_path):
-    measured = read_measurement(opensim("Rajagopal", tmp_path), mass=90.0)
+    measured = read_person(opensim("Rajagopal", tmp_path), mass=90.0)
     assert measured.mass == 90.0 and any("The forces bear 7" in note and "not 90" in note for note in measured.notes)
-    alone = read_measurement([tmp_path / "ik.mot", tmp_path / "id.sto"])
+    alone = read_person([tmp_path / "ik.mot", tmp_path / "id.sto"])
     assert alone.mass is None and any("--mass" in note for note in alone.notes)
-    weighed = read_measurement([tmp_path / "ik.mot", tmp_path / "id.sto"], mass=MASS)
+    weighed = read_person([tmp_path / "ik.mot", tmp_path / "id.sto"], mass=MASS)
     assert "ankle_moment" in weighed.legs["left"].curves and FORCES[0] not in weighed.legs["left"].curves

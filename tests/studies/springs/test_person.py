@@ -69,9 +69,6 @@ def test_planted_truth_comes_back(policy, given, tmp_path, capsys):
                 if (row["joint"], row["side"]) == (joint, side) and row["quasi_stiffness"]:
                     truth = body.total_mass * slope_of(angle, moment, row)
                     found = float(row["quasi_stiffness"])
-                    print(
-                        f"{policy} {given}: {side} {joint}, {row['phase']}: {truth:.1f}, read {found:.1f}, {found / truth - 1:+.1%}"
-                    )
                     # The toe of a flat foot hardly bears: 0.5 N m/rad is the noise of a slope near 0.
                     assert found == pytest.approx(truth, rel=0.05, abs=0.5)
                     values[side, joint, row["phase"]] = found
@@ -120,6 +117,7 @@ def test_every_file_is_written_and_read_again(mine, tmp_path, capsys):
     assert right == pytest.approx(0.8 * left, rel=1e-4) and left == pytest.approx(norm, rel=0.02)
     for name in ("schedule.csv", "finite_states.json"):
         _, settings = policy_and_settings(str(out / name), {"mass": 71.0})
+        assert settings.schedule is not None
         stiffness, _ = settings.schedule.at(0.4)
         assert settings.equilibrium == "phase" and 200 < stiffness[0] < 900
     states = json.loads((out / "finite_states.json").read_text(encoding="utf-8"))

@@ -21,7 +21,7 @@ MASSES_APART = 1.1
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Measurement:
+class MeasuredPerson:
     """One person's walk, measured."""
 
     gait: OwnGait
@@ -41,7 +41,7 @@ class Measurement:
         return float(np.mean((off - begin) / (end - begin))) if len(begin) else self.gait.toe_off
 
 
-def read_measurement(
+def read_person(
     paths: Sequence[str | Path],
     *,
     condition: str | None = None,
@@ -50,7 +50,7 @@ def read_measurement(
     speed: float | None = None,
     trust_units: bool = False,
     columns: Mapping[str, str] = NO_NAMES,
-) -> Measurement:
+) -> MeasuredPerson:
     """Return one person's walk from its files; `speed` [m/s] goes before that of the files, the rest as of `read_gait`.
 
     Legs on which the strides are too few for a spread have what there is. Raises `SpringfootError` as `read_gait` does,
@@ -98,7 +98,7 @@ def read_measurement(
     mass_from = "as given" if mass is not None else "from the forces over whole strides"
     if mass is not None and borne is not None and not 1 / MASSES_APART < borne / mass < MASSES_APART:
         notes.append(f"The forces bear {borne:.3g} kg, not {mass:g}.")
-    return Measurement(
+    return MeasuredPerson(
         gait=gait, legs=legs, mass=borne if mass is None else mass, mass_from=mass_from, notes=tuple(notes)
     )
 
