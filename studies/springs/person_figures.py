@@ -14,7 +14,7 @@ from springfoot.gait import HumanGait
 from springfoot.gait.people import PERCENT
 from springfoot.gait.springs import SPRINGS
 
-SIDE_COLOURS = {"left": "#0b6e8f", "right": "#c77800", "both": "#0b6e8f"}
+LINE_COLOURS = {"left": "#0b6e8f", "right": "#c77800", "both": "#0b6e8f"}
 """Side -> its colour."""
 CURVE_PANELS = (
     ("hip", "knee", "ankle", "toe"),
@@ -39,7 +39,7 @@ def draw_curves(path: Path, sheet: Sheet, norm: HumanGait) -> None:
                     ax.plot(PERCENT, mean, color=PEOPLE, lw=1.2, label="norm ± SD")
                 for side, curves in sheet.items():
                     if name in curves:
-                        ax.plot(PERCENT, unit * curves[name], color=SIDE_COLOURS[side], lw=1.6, label=side)
+                        ax.plot(PERCENT, unit * curves[name], color=LINE_COLOURS[side], lw=1.6, label=side)
                 ax.set_title(f"{name.replace('_', ' ').capitalize()}, {'deg' if is_angle else 'N·m/kg'}")
                 _finish(ax)
         for ax in figure.axes[-len(CURVE_PANELS[0]) :]:
@@ -62,7 +62,7 @@ def draw_loops(path: Path, sheet: Sheet, norm: HumanGait, starts: Mapping[tuple[
                     continue
                 at = np.linspace(bounds[0], bounds[-1], 200)
                 angle, moment = (curves[name] for name in (joint, f"{joint}_moment"))
-                colour = SIDE_COLOURS.get(side, PEOPLE)
+                colour = LINE_COLOURS.get(side, PEOPLE)
                 ax.plot(*_point(at, angle, moment), color=colour, lw=1.5, label=side)
                 ax.plot(*_point(bounds, angle, moment), "o", color=colour, ms=3.5)
             ax.set(title=f"{joint.capitalize()}, stance", xlabel="angle (deg)", ylabel="moment (N·m/kg)")
