@@ -136,7 +136,7 @@ def test_human_names_a_file_one_of_its_conditions_or_several_files(tmp_path):
     ("words", "message"),
     [
         (["--out", "new", "--human", "nothing.csv"], "no file nothing.csv"),
-        (["--out", "new", "--human", "file"], "must be a .csv, .mot, .sto or .c3d file"),
+        (["--out", "new", "--human", "file"], "must be a .csv, .txt, .mot, .sto or .c3d file"),
         ([], "give either --out NEW_FOLDER or --resume FOLDER"),
         (["--out", "new", "--resume", "old"], "give either"),
         (["--out", "new", "--mass", "-1"], "mass must be"),

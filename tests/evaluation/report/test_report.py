@@ -40,6 +40,7 @@ FILES = {
     "walk.mot",
     "walk.sto",
     "model.xml",
+    "external_loads.xml",
 }
 PARQUET = {"every_stride.parquet"}  # where pyarrow is installed
 
