@@ -72,7 +72,7 @@ def train_main(arguments: Sequence[str] | None = None, program: str = "train.py"
 
 
 def run_training(flags: TrainFlags) -> int:
-    """Check the flags, train or continue a run, and print its result, its folder and what to type next; return the exit
+    """Check the flags, train or continue a run, and print its result, its folder and the next commands; return the exit
     code."""
     settings = given(flags.training) | given(flags.environment)
     from springfoot.agents.policies.policy import RUN  # here, as below: help and bad flags need no simulator
@@ -129,7 +129,7 @@ def run_training(flags: TrainFlags) -> int:
 
 
 def next_lines(record: dict[str, Any], folder: Path) -> list[str]:
-    """Return the lines that say what to type after a training into `folder`, whose run.json is `record`."""
+    """Return the lines with the next commands after a training into `folder`, whose run.json is `record`."""
     from springfoot.agents.training.run_record import evaluations_of_one_task
 
     environment = record["config"]["environment"]
@@ -197,7 +197,7 @@ def _engine(rllib: bool) -> Any:
 def run_seeds(config: TrainingConfig, out: Path, count: int) -> int:
     """Train from `count` seeds, beginning at `config.seed`, each into a folder in `out`; return the exit code.
 
-    Prints a table of the seeds with their spread, the folders, and what to type next.
+    Prints a table of the seeds with their spread, the folders, and the next commands.
     """
     from springfoot.agents.policies.policy import RUN
     from springfoot.agents.training import multi_seed

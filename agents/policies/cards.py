@@ -1,4 +1,4 @@
-"""Describe the policies that come with the package: a model card each, of what their files say."""
+"""Describe the policies that come with the package: a model card each, made from their files."""
 
 from hashlib import sha256
 

@@ -1,4 +1,4 @@
-"""Let a person act: offsets to the rest angles of hips, knees and ankles; and say who then sets the stiffness.
+"""Let a person act: offsets to the rest angles of hips, knees and ankles; and name the source of the stiffness.
 
 The offsets are added to the rest angles that the leg constants give, every 20 ms. They are 0 while the body stands, and
 do nothing at an ankle with a rest angle or a device of its own.
@@ -22,7 +22,7 @@ DRAWN_SOURCES = ("scaled", "constant", "random")
 
 
 def draw_source(settings: BipedSettings, random: np.random.Generator) -> tuple[int, int, int, NDArray]:
-    """Return the fields of `STIFFNESS_SOURCE` for one episode: who sets the stiffness, drawn if the setting says so.
+    """Return the fields of `STIFFNESS_SOURCE` of one episode, drawn if the setting says so.
 
     Draws nothing for the sources "action" and "schedule".
     """

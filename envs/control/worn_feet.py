@@ -41,10 +41,10 @@ class WornFeet:
     def draw(
         self, randoms: Sequence[np.random.Generator], given: Mapping[str, Sequence[Any]] | None = None
     ) -> list[FootPair]:
-        """Draw the feet of K environments from their generators; return what replaces the environments' own.
+        """Draw the feet of K environments from their generators; return the feet in place of the environments' own.
 
         `given` has K feet in place of drawn ones, by the names of `FOOT_SETTINGS`, checked or in plain JSON.
-        Feet are drawn there too, so that what is drawn next does not depend on `given`.
+        Feet are drawn there too, so that later draws do not depend on `given`.
         """
         chosen = [self.chosen(name, (given or {}).get(name, [None] * len(randoms))) for name in FOOT_SETTINGS]
         replaced = []
@@ -79,7 +79,7 @@ class WornFeet:
         return changed
 
     def to_json(self, ids: Sequence[int]) -> list[list[Any]]:
-        """Return what replaces the own feet of environments `ids` (K,), K pairs of plain JSON values."""
+        """Return the feet in place of the own ones of environments `ids` (K,), K pairs of plain JSON values."""
         return [[foot and foot.to_json() for foot in self._replaced[index]] for index in ids]
 
     def from_json(self, pairs: Any, count: int) -> list[FootPair]:

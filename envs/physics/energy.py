@@ -169,7 +169,7 @@ def _sum_work(parts, steps, control, push, timestep, torque, work, energy):
 
 @kernel
 def _sum_changes(parts, control, control_before, angle, energy):
-    """Add to `energy` [J] what the springs gain by changes of K and theta_eq under load, as a window begins.
+    """Add to `energy` [J] the gain of the springs by changes of K and theta_eq under load, as a window begins.
 
     Args:
         parts: (N,) of `PARTS`.

@@ -43,7 +43,7 @@ three constants it is varied in docs/results/cost.md.
 TORQUE_LIMIT = (200.0, 200.0, 200.0, 60.0)
 """Largest actuator torque [N m] at 1.70 m and 63 kg, in the order of `JOINTS`.
 
-Chosen above what walking takes: `pretrained` reaches 57, 43, 83 and 24 N m in 20 episodes of 20 s.
+Chosen above the torques of walking: `pretrained` reaches 57, 43, 83 and 24 N m in 20 episodes of 20 s.
 """
 ARMATURE = (0.02, 0.01, 0.005, 0.002)
 """Inertia added to each joint's own [kg m^2] at 1.70 m and 63 kg, in the order of `JOINTS`.
@@ -98,7 +98,7 @@ def torque_ranges(body: Body, feet: Feet) -> NDArray:
 
 
 def springs_of(model: mujoco.MjModel) -> tuple[NDArray, NDArray]:
-    """Return what a compiled model says of its joints' actuators: beta [s], (side, joint), and the lowest and highest
+    """Return numbers of the joints' actuators in a compiled model: beta [s], (side, joint), and the lowest and highest
     torque [N m], (side, joint, 2)."""
     legs = (len(SIDES), len(JOINTS))
     names = [f"{joint}_{side}" for side in SIDES for joint in JOINTS]

@@ -1,4 +1,4 @@
-"""Measure what the muscles of N bodies do in each control window: the moment of their fibres, and its price.
+"""Measure the work of the muscles of N bodies in each control window: the moment of their fibres, and its price.
 
 The price is that of `springfoot.gait.plan.effort`, compiled. A window of 10 ms is one of its intervals: moments are
 means over the physics steps, work is their sum. The moments of single steps are no muscle's: rest angles are held for a
@@ -43,7 +43,7 @@ MUSCLE_ROW = np.dtype(
         ("positive_work", float),  # of all actuators in the step [J]
     ]
 )
-"""What the muscles of one body did lately."""
+"""Recent work of the muscles of one body."""
 
 _tissue_moments = part(tissue_moments)
 _interval_work = part(interval_work)
@@ -101,7 +101,7 @@ def actuator_torque(segments, control, theta, theta_rate, side, joint) -> float:
 
 @part
 def work_muscles(row, m, segments, velocity, control) -> None:
-    """Add a control window to what the muscles of one body did; nothing if no time has passed.
+    """Add a control window to the work of the muscles of one body; nothing if no time has passed.
 
     Args:
         row: of `MUSCLE_ROW`.

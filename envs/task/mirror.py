@@ -1,7 +1,7 @@
 """Mirror the world: left and right change places, half a stride later.
 
 The body is planar, so an angle, a force or a speed of one leg becomes the same number of the other leg. Names decide:
-what ends in `_left` has its image in `_right`, all else belongs to both legs.
+a name in `_left` has its image in `_right`, all else belongs to both legs.
 """
 
 from collections.abc import Sequence

@@ -111,5 +111,5 @@ OBSERVATION = _entries()
 """Every entry of the observation, in order. l is the leg length (hip to floor when standing); the weight is that of
 body and load. No entry tells the mass of the body, as mechanics scale with it (`envs.physics.model`)."""
 PERSON_OBSERVATION = OBSERVATION + _further_entries()
-"""Every entry of the observation where the action moves the person: `OBSERVATION`, and what a person knows besides.
+"""Every entry of the observation where the action moves the person: `OBSERVATION`, and the entries of a person.
 Stiffness is over that unit at 1.70 m and 63 kg, scaled with mass x height."""

@@ -1,4 +1,4 @@
-"""Measure what a recorded walk costs its muscles, by the price of `springfoot.gait.plan.effort`."""
+"""Measure the cost of a recorded walk to its muscles, by the price of `springfoot.gait.plan.effort`."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -58,7 +58,7 @@ def policy_data(recording: Recording, gait: Gait) -> dict[str, Any]:
 
 
 def people_words(settings: BipedSettings, human: HumanGait) -> str:
-    """Return whose the grey curves are, and of what their band is the spread."""
+    """Return the owner of the grey curves, and the sample of which their band is the spread."""
     if settings.human is None:
         return f"people at {human.speed:.2f} m/s, mean ± SD over {ADULTS} adults"
     borrowed = ", of people where it has no data" if human.borrowed else ""

@@ -131,7 +131,7 @@ def _all_fell(metrics: dict[str, Any]) -> bool:
 
 
 def _hint_on_falls(environment: dict[str, Any]) -> str:
-    """Return what to try after nothing but falls in an `environment`, the settings in metrics.json."""
+    """Return a hint after nothing but falls in an `environment`, the settings in metrics.json."""
     tuned = environment["acts"] == "stiffness" and environment["person"] == "tuned" and environment["guide"] == "people"
     if tuned and any(environment[foot] != "intact" for foot in FOOT_SETTINGS):
         return "on these feet try --person learned"

@@ -33,7 +33,7 @@ class MeasuredPerson:
     mass_from: str
     """Where the mass comes from, in words."""
     notes: tuple[str, ...]
-    """Sentences on what was guessed or left out."""
+    """Sentences on guesses and omissions."""
 
     def toe_off(self, side: str) -> float | None:
         """Return the mean phase of toe-off of a leg, 0..1; None if nothing tells it."""
@@ -53,8 +53,8 @@ def read_person(
 ) -> MeasuredPerson:
     """Return one person's walk from its files; `speed` [m/s] goes before that of the files, the rest as of `read_gait`.
 
-    Legs on which the strides are too few for a spread have what there is. Raises `SpringfootError` as `read_gait` does,
-    for forces that bear nobody's mass, and for a toe's moment larger than the ankle's.
+    Legs with too few strides for a spread have all of theirs. Raises `SpringfootError` as `read_gait` does, for forces
+    that bear nobody's mass, and for a toe's moment larger than the ankle's.
     """
     if mass is not None:
         require_within("mass", mass, MASS_RANGE, "kg")

@@ -62,7 +62,7 @@ class Trial:
     columns: Sequence[str] = ()
     """Names of the file's columns, if it is a text file."""
     notes: tuple[str, ...] = ()
-    """Sentences on what was guessed."""
+    """Sentences on guesses."""
 
 
 def csv_trial(table: Table) -> Trial:

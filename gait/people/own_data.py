@@ -155,7 +155,7 @@ def read_gait(
 
 
 def read_files(paths: Sequence[str | Path], columns: Mapping[str, str] = NO_NAMES) -> Table | MeasuredWalk:
-    """Return what stands in files of one walk: a table of mean curves over percent, or the walk over time.
+    """Return the content of files of one walk: a table of mean curves over percent, or the walk over time.
 
     `columns` as of `read_gait`. Raises `SpringfootError` for an unreadable file, for a column that is in none, and for
     a name that means nothing here.

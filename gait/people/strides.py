@@ -60,7 +60,7 @@ class MeasuredWalk:
     speed: float | None
     """Walking speed [m/s]; None if no file has it."""
     notes: tuple[str, ...] = ()
-    """Sentences on what was guessed or left out."""
+    """Sentences on guesses and omissions."""
 
     @property
     def last(self) -> float:

@@ -4,7 +4,7 @@
     springfoot study controls learned
 
 With the policy `schedule` one sound person walks whom nobody adapts; a learned person adapts to each condition. A
-device that does nothing must cost nothing, and one that takes over a part of what a tendon gives back must not look
+device that does nothing must cost nothing, and one that takes over a part of a tendon's return must not look
 like a large saving. Conditions are compared where all walk equally fast (`walked_speeds`), under both prices.
 """
 

@@ -8,7 +8,7 @@ All persons walk the same episodes on all feet, undisturbed at two commanded spe
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -24,12 +24,13 @@ from springfoot.envs.settings import body_of, settings_from
 from springfoot.errors import SpringfootError, require_number
 from springfoot.evaluation.numbers import Gait, effort_numbers, measure
 from springfoot.evaluation.page import foot_words, write_page
-from springfoot.evaluation.recording import Recording, policy_and_settings, record_feet
+from springfoot.evaluation.recording import Recording, record_feet
 from springfoot.evaluation.report import STYLE
 from springfoot.files.markdown import MISSING, table, text_of
 
 from ..base.flags import read_foot_flag
 from ..base.study import Answer, OnProgress, WalkingStudy
+from .adapting_persons import person_and_settings
 from .foot_numbers import numbers_of
 from .orthosis import braced_calf
 from .told_apart import GAP, common_speed, difference, price_at, verdict
@@ -46,7 +47,7 @@ PRICE_NAMES = dict(zip(TWO_PRICES, ("fibre work", "effort"), strict=True))
 CANNOT_SAY = """- It is a body in a plane: nothing here is about comfort, pain, or balance to the side.
 - The person has adapted to all feet at once; one who wears a single foot for weeks may walk cheaper on it.
 - Read differences, not the price itself. A missing ankle comes out cheaper here than a sound one; people pay more."""
-"""What the model cannot say."""
+"""Limits of the model."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -130,7 +131,7 @@ class FootChoice(WalkingStudy):
         if not 2 <= count <= MOST_FEET:
             raise SpringfootError(f"give 2 to {MOST_FEET} different springs or feet, got {count}")
 
-    @property
+    @cached_property
     def feet(self) -> dict[str, Any]:
         """Return name -> setting of each foot."""
         if self.spring:
@@ -150,7 +151,8 @@ class FootChoice(WalkingStudy):
     def ask(self, progress: OnProgress) -> Answer:
         """Walk on every foot."""
         names = list(self.feet)
-        persons = [self._person(name) for name in self.persons]
+        given = {"height": self.height, "mass": self.mass, "speed": self.speed, "episode_seconds": self.seconds}
+        persons = [person_and_settings(name, given) for name in self.persons]
         walks, slower, pushed = (
             [self._walk(*person, progress, **changed) for person in persons]
             for changed in ({}, {"speed": self._other_speed}, {"push_newton": self.push_newton})
@@ -182,14 +184,6 @@ class FootChoice(WalkingStudy):
     def _other_speed(self) -> float:
         """Return the second commanded speed [m/s]."""
         return self.speed * (1.0 - OTHER_SPEED)
-
-    def _person(self, name: str) -> tuple[PolicyFunction, BipedSettings]:
-        """Return a person by name, and the settings to walk it with."""
-        given = {"height": self.height, "mass": self.mass, "speed": self.speed, "episode_seconds": self.seconds}
-        act, settings = policy_and_settings(name, given)
-        if settings.acts == "stiffness":
-            raise SpringfootError(f"{name} moves no person: it was trained with acts 'stiffness'")
-        return act, settings
 
     def _walk(
         self, act: PolicyFunction, settings: BipedSettings, progress: OnProgress, **changed: float

@@ -21,12 +21,13 @@ from springfoot.envs import BipedSettings
 from springfoot.envs.physics import SOUND
 from springfoot.envs.settings import body_of
 from springfoot.envs.task import PERSON_OBSERVATION, WORN, worn_entries
-from springfoot.errors import SpringfootError, require_number
+from springfoot.errors import require_number
 from springfoot.evaluation.numbers import measure
 from springfoot.evaluation.recording import policy_and_settings, record, record_feet
 from springfoot.files.markdown import MISSING, table, text_of
 
 from ..base.study import Answer, OnProgress, WalkingStudy
+from .adapting_persons import person_and_settings
 from .foot_numbers import numbers_of
 from .walked_speeds import Row, rows_csv
 
@@ -105,9 +106,7 @@ class FootMap(WalkingStudy):
 
     def _feet(self, person: str, progress: OnProgress) -> list[dict[str, Any]]:
         """Return a row for each foot, told the truth and told that it is sound."""
-        act, settings = policy_and_settings(person, {"speed": self.speed, "episode_seconds": self.seconds})
-        if settings.acts == "stiffness":
-            raise SpringfootError(f"{person} moves no person: it was trained with acts 'stiffness'")
+        act, settings = person_and_settings(person, {"speed": self.speed, "episode_seconds": self.seconds})
         groups = [(name, foot) for name, feet in MAPPED_FEET.items() for foot in feet]
         rows = []
         for told, acting in zip(TOLD, (act, told_sound(act, settings)), strict=True):

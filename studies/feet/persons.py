@@ -25,6 +25,7 @@ from springfoot.files.markdown import MISSING, table, text_of
 from springfoot.files.writing import csv_text
 
 from ..base.study import Answer, OnProgress, WalkingStudy
+from .adapting_persons import person_and_settings
 
 SOUND_SPEEDS = (0.9, 1.0, 1.2, 1.4, 1.5)
 """Commanded speeds on sound feet [m/s]."""
@@ -129,9 +130,7 @@ class Persons(WalkingStudy):
         drawn: dict[str, dict[float, list[DrawnEpisode]]] = {}
         sound: list[dict[str, Any]] = []
         for name in self.persons:
-            act, settings = policy_and_settings(name, {})
-            if settings.acts == "stiffness":
-                raise SpringfootError(f"{name} moves no person: it was trained with acts 'stiffness'")
+            act, settings = person_and_settings(name, {})
             ranges = replace(
                 PRESETS["person"].environment,
                 acts=settings.acts,

@@ -182,7 +182,7 @@ class Predict(WalkingStudy):
         return Answer(text=f"{text}\n\n{times}")
 
     def _train(self, settings: BipedSettings, out: Path) -> None:
-        """Train a policy in the folder `out`, or what is left of its training."""
+        """Train a policy in the folder `out`, or the rest of its training."""
         from springfoot.agents import resume, train  # torch takes seconds, which --help need not wait for
 
         preset = PRESETS["predict"]

@@ -86,7 +86,7 @@ class Person(Study):
 
     files: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="FILE ...", help_behavior_hint="")]
     """Motion files of one walk: CSV, OpenSim's .mot and .sto, .c3d, Visual3D's .txt; FILE:CONDITION for one of several
-    in a CSV. docs/how-to/own-data.md says what is read."""
+    in a CSV. docs/how-to/own-data.md lists the columns."""
     mass: float | None = None
     """Body mass [kg]; None takes the mass that the forces bear."""
     height: float = REFERENCE_HEIGHT
@@ -138,7 +138,7 @@ class Person(Study):
 
 
 class _Sheet:
-    """What is said of one person."""
+    """The report on one person."""
 
     def __init__(self, asked: Person, measured: MeasuredPerson):
         self._asked = asked
@@ -386,7 +386,7 @@ class _Sheet:
         return f"{words} The norm's toe is unknown; its ankle is scaled with mass and height."
 
     def _read_list(self, notes: list[str]) -> str:
-        """Return the list of what was read, borrowed and left out."""
+        """Return the list of readings, borrowings and omissions."""
         gait = self._measured.gait
         counts = {side: len(leg.times) for side, leg in self._measured.legs.items() if len(leg.times)}
         strides = ", ".join(f"{count} {side}".strip() for side, count in counts.items())

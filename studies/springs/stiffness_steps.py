@@ -252,7 +252,7 @@ class _Record:
     def _keep(self, tick: Tick) -> None:
         """Keep all walks' positions and forces, and phase and stride of the unchanged ones.
 
-        In their first stride also compute what each change would do to the present state (`_sample`).
+        In their first stride also compute the effect of each change on the present state (`_sample`).
         """
         m = tick.measurement
         unchanged = slice(self._num)  # they come first

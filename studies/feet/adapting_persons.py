@@ -1,0 +1,19 @@
+"""Find policies that move a person: those that adapt to feet."""
+
+from typing import Any
+
+from springfoot.agents.policies import PolicyFunction
+from springfoot.envs import BipedSettings
+from springfoot.errors import SpringfootError
+from springfoot.evaluation.recording import policy_and_settings
+
+
+def person_and_settings(name: str, given: dict[str, Any]) -> tuple[PolicyFunction, BipedSettings]:
+    """Return the policy `name`, which moves a person, and the settings to walk it with, as `policy_and_settings`.
+
+    Raises `SpringfootError` for a policy that sets stiffness alone.
+    """
+    act, settings = policy_and_settings(name, given)
+    if settings.acts == "stiffness":
+        raise SpringfootError(f"{name} moves no person: it was trained with acts 'stiffness'")
+    return act, settings
