@@ -76,6 +76,7 @@ def readers(folder: Path) -> dict[str, Reader]:
         "own data, mean curves": Reader(read=_own, suffix=".csv", bases=(_percent(), _percent(("knee", "ankle")))),
         "own data over time": Reader(read=_own, suffix=".csv", bases=(_over_time(),)),
         "own data of OpenSim": Reader(read=_own, suffix=".mot", bases=(_opensim(),)),
+        "own data of Visual3D": Reader(read=_own, suffix=".txt", bases=(_visual3d(),)),
         "own data, C3D": Reader(read=_own, suffix=".c3d", bases=_c3d(folder)),
         "foot, table": Reader(read=_foot, suffix=".csv", bases=(_foot_table(),)),
         "foot, JSON": Reader(read=_foot, suffix=".json", bases=tuple(json.dumps(foot).encode() for foot in _FEET)),
@@ -288,6 +289,17 @@ def _opensim() -> bytes:
         for name, column in {"thigh": "hip_flexion", "knee": "knee_angle", "ankle": "ankle_angle"}.items():
             columns[f"{column}_{side}"] = np.degrees(people.mean(name, phase))
     return _table(columns, "walk.mot\nnRows=400\ninDegrees=yes\nendheader\n", "\t")
+
+
+def _visual3d() -> bytes:
+    people = human_gait(1.2)
+    columns = {"": np.arange(1, len(PERCENT) + 1)}
+    for name, joint in {"thigh": "Hip", "knee": "Knee", "ankle": "Ankle"}.items():
+        columns[f"L{joint}Angle"] = np.degrees(people.mean(name, PERCENT / 100))
+    names, *rows = _table(columns, separator="\t").decode().splitlines()
+    heads = [f"\t{word}" * (len(columns) - 1) for word in ("walk.c3d", "LINK_MODEL_BASED", "ORIGINAL")]
+    components = "ITEM" + "\tX" * (len(columns) - 1)
+    return "\n".join([heads[0], names, *heads[1:], components, *rows, ""]).encode()
 
 
 def _c3d(folder: Path) -> tuple[bytes, ...]:

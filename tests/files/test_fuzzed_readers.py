@@ -66,8 +66,10 @@ class Seen:
         if event != "call" or frame.f_code.co_name not in READING:
             return
         caller = frame.f_back
-        while caller is not None and room_and_file(caller.f_code.co_filename) is None:
-            caller = caller.f_back  # a generator that the standard library reads from
+        while caller is not None and (
+            room_and_file(caller.f_code.co_filename) is None or caller.f_code.co_name.startswith("<")
+        ):
+            caller = caller.f_back  # the standard library that reads from a generator, or a comprehension
         if caller is not None and (name := room_and_file(caller.f_code.co_filename)):
             self.callers.add((name, caller.f_code.co_name))
 
