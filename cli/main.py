@@ -1,7 +1,7 @@
 """Define the command `springfoot`: the code of `train.py` and `evaluate.py`, and every study by its name."""
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -34,7 +34,7 @@ HELP = f"""usage: springfoot {{{",".join(COMMANDS)}}} ...
   springfoot feet                   which spring or foot takes a person least? such as --spring 0 2 4 6
   springfoot person FILE ...        how stiff is this person? ankle and toe from their motion files
   springfoot export POLICY          write it as an ONNX file, which runs without springfoot
-  springfoot study NAME             hold many walks against each other; springfoot study --help lists them
+  springfoot study NAME             hold many walks against each other; springfoot study --help lists some
   springfoot datasets               write Minari sets of walks, for offline learning
   springfoot examples --copy FOLDER copy the programs to start from, for springfoot and other learners
   springfoot completion SHELL       print the tab completion of commands, policies and flags for bash or zsh
@@ -73,6 +73,8 @@ STUDIES = {
     "play": ("walks.play.Play", "What does a stiffness do to a walk? A recorded page to play with."),
 }
 """Name of each study on the command line -> its class, imported when asked for, and its question."""
+ASKED_BY_USERS = ("compare", "bodies", "identify", "orthosis", "prosthesis", "drop-foot")
+"""Studies that help lists; `--all` lists the others too, most of which made tables of this project's docs."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -155,8 +157,8 @@ def study_main(arguments: Sequence[str]) -> int:
     It is 0 done, 1 a training failed, 2 bad input, 130 Ctrl-C, 143 SIGTERM.
     """
     name, *words = arguments or ["--help"]
-    if name in ("-h", "--help"):
-        print(study_help())
+    if name in ("-h", "--help", "--all"):
+        print(study_help(STUDIES if "--all" in arguments else ASKED_BY_USERS))
         return 0
     if name not in STUDIES:
         known = f"there are {', '.join(STUDIES)}{perhaps(name, STUDIES)}"
@@ -185,16 +187,17 @@ def _installed_studies() -> "dict[str, type[Study]]":
     return classes
 
 
-def study_help() -> str:
-    """Return the help text of `springfoot study`: usage, and each study with its question."""
-    width = max(map(len, STUDIES))
-    lines = (f"  {name:<{width}}  {question}" for name, (_, question) in STUDIES.items())
+def study_help(names: Collection[str]) -> str:
+    """Return the help text of `springfoot study`: usage, and each study of `names` with its question."""
+    width = max(map(len, names))
+    others = len(STUDIES) - len(names)
     return "\n".join(
         [
             "usage: springfoot study NAME [--quick] [--out FOLDER] ...",
             "",
-            *lines,
+            *(f"  {name:<{width}}  {STUDIES[name][1]}" for name in names),
             "",
+            *([f"springfoot study --all lists {others} more, behind tables of docs/results."] if others else []),
             "Each takes --help; with --quick it runs a minute at most, only to be seen to run.",
         ]
     )

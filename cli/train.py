@@ -38,8 +38,8 @@ class TrainFlags:
     out: Annotated[Path | None, FOLDER] = None
     """New folder for the run."""
     resume: Annotated[Path | None, FOLDER] = None
-    """Folder of a run to continue, with its saved settings, bit for bit as if nothing had interrupted it; --timesteps
-    is then how many more, --threads may be others, and --reward-weights others from there on."""
+    """Folder of a run to continue, with its saved settings, bit for bit as if nothing had interrupted it. --timesteps
+    then counts further steps; --threads and --reward-weights may be changed."""
     begin_from: Annotated[Path | None, FOLDER] = None
     """Folder of a run whose network the training begins with, in place of an untrained one, as to adapt a person to one
     foot; the task may be another, observations and actions not."""
@@ -47,9 +47,9 @@ class TrainFlags:
     """Train from so many seeds at once, --seed and the next ones: one process a processor, one thread each, one
     report with the spread; each in a folder seed-N of --out."""
     preset: Literal["walk", "any-body", "predict", "person"] = "walk"
-    """Training that is known to work, from which the other flags differ: one body at one speed; people of
-    1.45-2.00 m and 40-120 kg at 0.8-1.6 m/s, drawn anew for each episode, with speeds that change within it; one body
-    that follows its own plan, no curve of people's; or a person who walks on any foot."""
+    """Training that is known to work, which the other flags change. walk: one body at one speed. any-body: people of
+    1.45-2.00 m and 40-120 kg at 0.8-1.6 m/s, drawn anew for each episode, with speeds that change within it. predict:
+    one body that follows its own plan, no curve of people's. person: a person who walks on any foot."""
     engine: ENGINES = "sb3"
     """Library that learns: stable-baselines3 on this machine, or RLlib on a Ray cluster (extra `rllib`), that of the
     variable RAY_ADDRESS or this machine. --resume goes on with the engine that began."""

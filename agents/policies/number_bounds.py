@@ -16,7 +16,7 @@ _MOMENTS = frozenset({"step", "exp_avg", "exp_avg_sq"})
 
 
 def require_bounded(path: object, tensors: Mapping[str, np.ndarray]) -> None:
-    """Raise `SpringfootError` for numbers that no training makes, by the kind of tensor that its name tells.
+    """Raise `SpringfootError` for numbers that no training can produce; a tensor's name decides the range.
 
     `path` is the file, or another subject of the error.
     """

@@ -75,7 +75,7 @@ def main() -> None:
     try:
         session = _session(Path(sys.argv[1]))
         if refused := sorted(REFUSED & _operators(onnx.load(sys.argv[1], load_external_data=False))):
-            raise SpringfootError(f"a policy may not use {refused[0]}")
+            raise SpringfootError(f"the operator {refused[0]} is not allowed in a policy")
     except Exception as error:  # onnxruntime's errors have no common class
         result["refused"] = one_line(error)
     else:

@@ -1,4 +1,4 @@
-"""Keep the newest few checkpoints of a run, each a whole file; a damaged one is passed over."""
+"""Keep the newest few checkpoints of a run, each a whole file of a `learning_state`; a damaged one is passed over."""
 
 import json
 import re

@@ -56,7 +56,8 @@ class TrainingConfig:
     hidden: tuple[int, ...] = (64, 64)
     """Widths of the hidden tanh layers, the same for actor and critic."""
     mirrored: bool = False
-    """One network for each leg, the right one's on the mirrored world: left and right act alike to the last bit."""
+    """One network for both legs; the right leg uses it on the mirrored world, so that left and right act alike to the
+    last bit."""
     eval_interval: int = 131_072
     """Environment steps between two periodic evaluations (deterministic, the training's own settings)."""
     eval_episodes: int = 16

@@ -193,7 +193,10 @@ class Biped(ExactState):
         self.subjects.command(ids, speed)
 
     def push(self, force: NDArray) -> None:
-        """Push the trunks forward by `force` (N,) [N] until the next call; `push_newton` must be 0, else it rules."""
+        """Push the trunks forward by `force` (N,) [N] until the next call.
+
+        It has no effect unless the setting `push_newton` is 0, since pushes that it draws replace the force.
+        """
         self._simulation.push(real_numbers("force", force))
 
     def reset(

@@ -135,11 +135,13 @@ def leg_constants(
         return constants_at(_sets_of(file, name), speed)
     table = _committed()
     if follows_plan and name not in table:
-        raise SpringfootError(f"no leg constants walk with guide 'plan' at cadence {cadence!r}; it must be 'people'")
+        raise SpringfootError(
+            f"there are no tuned leg constants for guide 'plan' and cadence {cadence!r}; it must be 'people'"
+        )
     if name not in table:
         raise SpringfootError(
-            f"no leg constants walk with equilibrium {equilibrium!r} at cadence {cadence!r} and {feedforward}'s "
-            "moments; equilibrium 'neutral' needs cadence 'people'"
+            f"there are no tuned leg constants for equilibrium {equilibrium!r}, cadence {cadence!r} and "
+            f"{feedforward}'s moments; equilibrium 'neutral' needs cadence 'people'"
         )
     return constants_at(_sets(table, name), speed)
 

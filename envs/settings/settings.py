@@ -138,7 +138,8 @@ class BipedSettings:
     speed: float = field(default=1.2, metadata=_SPEED)
     """Commanded walking speed [m/s]."""
     height_range: tuple[float, float] | None = field(default=None, metadata=_BODY | _DRAWN)
-    """Heights drawn at each reset in place of `height` [m], evenly; with the mass anew if they make no body."""
+    """Heights drawn at each reset in place of `height` [m], evenly. Height and mass are drawn again if such a body
+    cannot be."""
     mass_range: tuple[float, float] | None = field(default=None, metadata=_BODY | _DRAWN)
     """Body masses drawn at each reset in place of `mass` [kg], evenly and whatever the height."""
     drawn_bodies: tuple[DrawnBody, ...] | None = field(default=None, metadata=_BODY | _DRAWN)
@@ -331,7 +332,9 @@ class BipedSettings:
                 raise SpringfootError(f"stiffness_by {self.stiffness_by!r} needs acts 'person' or 'both'")
             return
         if self.person != "tuned":
-            raise SpringfootError(f"acts {self.acts!r}: the action is the person, which must be 'tuned' then")
+            raise SpringfootError(
+                f"acts {self.acts!r}: the policy itself moves the legs, so that person must be 'tuned'"
+            )
         if self.decisions not in ("50hz", "event"):
             raise SpringfootError(f"acts {self.acts!r} needs steps of 20 ms, decisions '50hz' or 'event'")
 

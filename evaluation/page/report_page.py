@@ -120,8 +120,8 @@ def _verdict(index: int, metrics: dict[str, Any], spoken: Mapping[str, str]) -> 
 def spoken_verdict(metrics: dict[str, Any], legs: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
     """Return the verdict in words: heading -> sentences on falls, walker, faults, speed, joints, forces and energy.
 
-    At the speed for which the criteria were chosen they judge the walk. At other speeds, and beside an own person, it
-    is held against the curves of people, or of that person, at its speed.
+    At the speed for which the criteria were chosen they judge the walk. At other speeds, or with the user's own
+    recording (the setting `human`), the walk is compared with people's curves or with that recording, without criteria.
 
     Args:
         metrics: content of metrics.json.

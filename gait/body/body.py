@@ -277,5 +277,5 @@ class Body:
     # Derived ------------------------------------------------------------------------------------------------
 
     def froude_speed(self, speed: float) -> float:
-        """Dimensionless speed v / sqrt(g * leg_length) of `speed` [m/s]."""
+        """Return the dimensionless speed v / sqrt(g * leg_length) of `speed` [m/s]."""
         return speed / sqrt(GRAVITY * self.leg_length)

@@ -267,7 +267,7 @@ def _path_by_matrices(
     of the walk gives the periodic start.
     """
     step_time = zmp_times[-1]
-    back, down = -gravity(slope)  # g sin a and g cos a on a slope a
+    back, down = -gravity(slope)  # g sin a along and g cos a across a slope a
     pieces = [
         np.linspace(start, end, round(STEP_SAMPLES * (end - start) / step_time) + 2)[:-1]
         for start, end in pairwise(zmp_times)
@@ -277,7 +277,7 @@ def _path_by_matrices(
     def equation(time: NDArray) -> NDArray:
         """Return the matrices A (times, 3, 3) of d/dt (x, x', 1) = A (x, x', 1).
 
-        They are those of x'' = (g cos a + z'') / z (x + ahead - p) - g sin a, with the ZMP p and the slope a.
+        They are those of x'' = (down + z'') / z (x + ahead - p) - back, with the ZMP p.
         """
         z = height + bob(time)
         squared_rate = (down + bob(time, 2)) / z

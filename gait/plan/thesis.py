@@ -174,19 +174,19 @@ class ThesisWalk:
         return (self._within(time) - self.step_time) / (self.k * self.step_time + self.highest_ankle_time)
 
     def com_height(self, time: ArrayLike, derivative: int = 0) -> NDArray:
-        """Z = 0.89 - 0.012 sin(4 pi (t - 2.62)) [m] or a time derivative. Fault: highest as double support begins."""
+        """Return Z = 0.89 - 0.012 sin(4 pi (t - 2.62)) [m] or its rate. Fault: highest as double support begins."""
         rate = 4 * pi
         # Each derivative of a sine leads it by a quarter turn.
         wave = -0.012 * rate**derivative * np.sin(rate * (np.asarray(time) - 2.62) + derivative * pi / 2)
         return wave + 0.89 if derivative == 0 else wave
 
     def com(self, time: ArrayLike) -> tuple[NDArray, NDArray]:
-        """Figure 6: CoM (x, z) [m]; passes its knots but for the least-squares cubic (by up to 46 mm)."""
+        """Return Figure 6: CoM (x, z) [m]; passes its knots but for the least-squares cubic (by up to 46 mm)."""
         time = self._within(time)
         return self._com_x[0](time), self.com_height(time)
 
     def com_acceleration(self, time: ArrayLike) -> tuple[NDArray, NDArray]:
-        """Acceleration of the CoM, xtt and ztt [m/s^2].
+        """Return the acceleration of the CoM, xtt and ztt [m/s^2].
 
         Fault: the thesis calls the vertical one too small to matter in 2.2, and uses it in the appendix.
         """
@@ -194,22 +194,22 @@ class ThesisWalk:
         return self._com_x[1](time), self.com_height(time, 2)
 
     def ankle(self, time: ArrayLike) -> tuple[NDArray, NDArray]:
-        """Figure 7: ankle (x, z) [m], a not-a-knot cubic spline. Fault: sinks by 6 mm in stance."""
+        """Return Figure 7: ankle (x, z) [m], a not-a-knot cubic spline. Fault: sinks by 6 mm in stance."""
         x, z = np.moveaxis(self._splines["ankle"](self._within(time)), -1, 0)
         return x, z
 
     def toe_joint(self, time: ArrayLike) -> tuple[NDArray, NDArray]:
-        """Figure 8: toe joint (x, z) [m], splined likewise. Fault: 23 mm in the floor in stance."""
+        """Return Figure 8: toe joint (x, z) [m], splined likewise. Fault: 23 mm in the floor in stance."""
         x, z = np.moveaxis(self._splines["toe"](self._within(time)), -1, 0)
         return x, z
 
     def ground_reaction(self, time: ArrayLike) -> tuple[NDArray, NDArray]:
-        """Figure 9, equation (2): (grf_horz_mod, grf_vert_mod) [N]. Fault: of both feet, as one."""
+        """Return Figure 9, equation (2): (grf_horz_mod, grf_vert_mod) [N]. Fault: of both feet, as one."""
         forward, up = self.com_acceleration(time)
         return self.body.mass * forward, self.body.mass * (GRAVITY + up)
 
     def zmp(self, time: ArrayLike) -> NDArray:
-        """Figure 10, equation (1): p_x = x - z x'' / (z'' + g) [m], garbled in print.
+        """Return Figure 10, equation (1): p_x = x - z x'' / (z'' + g) [m], garbled in print.
 
         Fault: with `division="matrix"` the quotient is MATLAB's, sum(a b) / sum(b b) over the knots, a = z x'' and
         b = z'' + g. The ZMP is then the CoM shifted, which is why the thesis saw it follow the CoM.
@@ -225,7 +225,7 @@ class ThesisWalk:
     # Joint torque --------------------------------------------------------------------------------------------
 
     def joint_torque(self, joint: Joint, time: ArrayLike) -> NDArray:
-        """Joint torque as printed [N m], torque_ankle_mod or torque_toe_mod; plantarflexion positive.
+        """Return the joint torque as printed [N m], torque_ankle_mod or torque_toe_mod; plantarflexion positive.
 
         Faults: r x F is multiplied by the sine of the sum of the directions of r and F, though it holds the sine of
         their difference already. Its term with z is multiplied by sin(1), as the sine is taken of a row of ones too.
@@ -237,7 +237,7 @@ class ThesisWalk:
         return sin(1) * z * forward - np.sin(turn) * x * up
 
     def cross_product(self, joint: Joint, time: ArrayLike) -> NDArray:
-        """Equation (3) as meant, r x F with r from ZMP to joint [N m]; plantarflexion positive."""
+        """Return equation (3) as meant, r x F with r from ZMP to joint [N m]; plantarflexion positive."""
         x, z = self._arm(joint, time)
         forward, up = self.ground_reaction(time)
         return z * forward - x * up

@@ -179,7 +179,7 @@ def _optional_flag(name: str, kind: Any, text: str, hint: str) -> Any:
 
 
 def given(flags: Any) -> dict[str, Any]:
-    """Return setting -> value of the flags that the user gave, in one dictionary for all themes.
+    """Return setting -> value of the flags that the user gave, in one dictionary for all groups of help.
 
     Values that name a file are replaced by its content. Raises `SpringfootError` for a bad file.
     """
@@ -193,7 +193,7 @@ def given(flags: Any) -> dict[str, Any]:
 
 
 def _given_words(flags: Any) -> dict[str, Any]:
-    """Return flag -> value of the flags that the user gave, and `TRUST`, in one dictionary for all themes."""
+    """Return flag -> value of the flags that the user gave, and `TRUST`, in one dictionary for all groups of help."""
     values: dict[str, Any] = {}
     for item in dataclasses.fields(flags):
         value = getattr(flags, item.name)

@@ -88,7 +88,7 @@ def prices_of(name: str, recording: Recording) -> list[Row]:
 
 
 def plan_prices() -> list[Row]:
-    """Return the rows of `prices_of` for the plan of least effort, whose joints are not told one by one."""
+    """Return the rows of `prices_of` for the plan of least effort, without the work of single joints."""
     plan = plan_walk(Body(), TUNED_SPEED, style=least_work(TUNED_SPEED))
     rows = []
     for case, muscle in CASES.items():

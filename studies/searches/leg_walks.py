@@ -75,11 +75,11 @@ def walk(
     rest = _eased_rest_angles(settings, candidates, ease) if ease else None
     biped = Biped(settings, num, threads, legs=candidates, variant=variant, rest=rest)
     biped.reset(np.arange(num), seeds)
-    # (N,) index of the foreign springs that a walk has; negative for the schedule.
+    # (N,) index in `foreign` of the springs that a walk has; negative for the schedule.
     springs = np.tile(np.arange(walks_each), len(candidates)) - (walks_each - len(foreign))
 
     def act(_observation: NDArray) -> NDArray:
-        """Return the actions (N, 4) that set the schedule, or the foreign springs, at each leg's phase."""
+        """Return the actions (N, 4) that set the schedule, or one of `foreign`, at each leg's phase."""
         if settings.action_mode == "residual":
             action = np.zeros((num, 2, 2))
         else:

@@ -218,7 +218,7 @@ class Identify(WalkingStudy):
 
     def ask(self, progress: OnProgress) -> Answer:
         """Push every policy, and find its springs."""
-        experiments = [self._push(name, progress) for name in self.policies]
+        experiments = [self._identify_policy(name, progress) for name in self.policies]
         if self.repeats:
             text = f"{coverage_table(experiments)}\n\n{self._coverage_note} {self._pushes}"
         else:
@@ -254,8 +254,9 @@ class Identify(WalkingStudy):
             f"mean stride's largest, lasting 50 ms.{further}"
         )
 
-    def _push(self, name: str, progress: OnProgress) -> Experiment:
-        """Return the experiment on the policy of that name, with its repeats on other episodes."""
+    def _identify_policy(self, name: str, progress: OnProgress) -> Experiment:
+        """Walk a policy pushed and undisturbed, and identify its springs; identify them again on shorter walks with
+        other seeds."""
         pushes = ("push_newton", "push_seconds", "push_interval")
         conditions: dict[str, Any] = {key: getattr(self, key) for key in pushes} | {"episode_seconds": self.seconds}
         conditions |= {"decisions": self.decisions} if self.decisions else {}

@@ -61,7 +61,7 @@ def test_a_setting_without_constants_is_refused():
     with pytest.raises(SpringfootError) as error:
         Biped(BipedSettings(equilibrium="neutral", cadence="thesis"), 1)
     assert str(error.value) == (
-        "no leg constants walk with equilibrium 'neutral' at cadence 'thesis' and people's moments; "
+        "there are no tuned leg constants for equilibrium 'neutral', cadence 'thesis' and people's moments; "
         "equilibrium 'neutral' needs cadence 'people'"
     )
 

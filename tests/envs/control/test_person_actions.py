@@ -149,7 +149,10 @@ def test_alone_as_in_a_batch_and_from_a_kept_state_to_the_bit() -> None:
     [
         ({"acts": "legs"}, "acts must be one of 'stiffness', 'person', 'both', got 'legs'"),
         ({"acts": "both", "decisions": "25hz"}, "acts 'both' needs steps of 20 ms"),
-        ({"acts": "both", "person": "x"}, "acts 'both': the action is the person, which must be 'tuned' then"),
+        (
+            {"acts": "both", "person": "x"},
+            "acts 'both': the policy itself moves the legs, so that person must be 'tuned'",
+        ),
         ({"stiffness_by": "schedule"}, "stiffness_by 'schedule' needs acts 'person' or 'both'"),
         ({"person_range_deg": 40.0}, "person_range_deg must be"),
     ],

@@ -88,7 +88,7 @@ def test_settings_that_need_people_are_refused():
     own |= {"mean": {}, "sd": {}}
     with pytest.raises(SpringfootError, match="human must be None with guide 'plan': the plan replaces human data"):
         settings_from(**PLAN, human=own)
-    with pytest.raises(SpringfootError, match="no leg constants walk with guide 'plan' at cadence 'thesis'"):
+    with pytest.raises(SpringfootError, match="there are no tuned leg constants for guide 'plan' and cadence 'thesis'"):
         Biped(BipedSettings(guide="plan", cadence="thesis"), 1)
     with pytest.raises(SpringfootError, match="guide must be"):
         settings_from(guide="nobody")

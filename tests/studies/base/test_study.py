@@ -5,7 +5,7 @@ from typing import Any, ClassVar
 
 import pytest
 
-from springfoot.cli.main import STUDIES, main, study_class
+from springfoot.cli.main import ASKED_BY_USERS, STUDIES, main, study_class
 from springfoot.errors import SpringfootError
 from springfoot.files.markdown import plus_minus
 from springfoot.files.writing import csv_text, whole_folder
@@ -82,6 +82,14 @@ def test_every_study_has_the_shared_flags_and_quick_sets_flags_it_has(name):
     fields = {field.name for field in dataclasses.fields(study)}
     assert issubclass(study, Study) and {"quick", "out"} <= fields
     assert set(study.QUICK) <= fields and study.QUICK
+
+
+def test_help_lists_the_studies_that_users_ask_for_and_all_of_them_when_asked(capsys):
+    assert (main(["study"]), main(["study", "--help"]), main(["study", "--all"])) == (0, 0, 0)
+    some, again, everything = (text.splitlines() for text in capsys.readouterr().out.split("usage: ")[1:])
+    assert some == again
+    listed = [[line.split()[0] for line in text if line.startswith("  ")] for text in (some, everything)]
+    assert listed == [list(ASKED_BY_USERS), list(STUDIES)]
 
 
 def test_unknown_commands_and_studies_are_one_line_that_names_those_there_are(capsys):
