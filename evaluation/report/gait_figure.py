@@ -1,4 +1,4 @@
-"""Draw gait.png: the gait cycle of the model over that of people."""
+"""Draw the gait cycle of the model over that of people (gait.png), and the stiffness of both feet (stiffness.png)."""
 
 from pathlib import Path
 from typing import Any
@@ -11,6 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from springfoot.arrays import NDArray
+from springfoot.envs.physics import SIDES
 from springfoot.envs.settings.settings import reference_gait
 from springfoot.gait import HumanGait
 from springfoot.gait.people.gait_events import PERCENT
@@ -70,6 +71,23 @@ def save_gait_figure(path: Path, recording: Recording, gait: Gait) -> None:
         for ax in [*grid[0], *grid[1], *grid[2, :2], *grid[3]]:
             _stride_axis(ax, metrics["toe_off_percent"], 100 * human.toe_off)
         _header(figure, recording, gait, human)
+        figure.savefig(path, dpi=130, **PNG)
+
+
+def save_stiffness_figure(path: Path, gait: Gait) -> None:
+    """Draw the stiffness K of ankles and toes over the stride into the picture `path`, each foot by itself."""
+    legs: Legs = tuple(zip(gait.feet, (MODEL, OTHER_LEG), strict=True))
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(9.0, 3.2), layout="constrained")
+        axes = figure.subplots(1, 2)
+        _stiffness(axes, legs)
+        for ax in axes:
+            _stride_axis(ax, gait.metrics["toe_off_percent"], None)
+        handles = {
+            f"{name} foot, mean ± SD over strides": _handle(colour)
+            for name, (_, colour) in zip(SIDES, legs, strict=True)
+        }
+        figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=2, frameon=False)
         figure.savefig(path, dpi=130, **PNG)
 
 
@@ -137,10 +155,7 @@ def _springs(axes: NDArray, legs: Legs, human: HumanGait) -> None:
 
     People's angle and power are behind them.
     """
-    for ax, name in zip(axes[:2], ("ankle", "toe"), strict=True):
-        ax.set(title=f"{name.capitalize()} stiffness K", ylabel="N·m/rad")
-        _model(ax, legs, f"{name}_stiffness_Nm_per_rad")
-        ax.set_ylim(0, 1.05 * ax.get_ylim()[1])
+    _stiffness(axes[:2], legs)
     ax = axes[2]
     ax.set(title="Ankle and its equilibrium", ylabel="dorsiflexion (deg)")
     _people(ax, np.degrees(human.mean("ankle", PERCENT / 100)), np.degrees(human.sd("ankle", PERCENT / 100)))
@@ -150,6 +165,14 @@ def _springs(axes: NDArray, legs: Legs, human: HumanGait) -> None:
     axes[3].set(title="Ankle power", ylabel="generation (W/kg)")
     _people(axes[3], human.mean("ankle_power", PERCENT / 100), human.sd("ankle_power", PERCENT / 100))
     _model(axes[3], legs, "ankle_power_W_per_kg")
+
+
+def _stiffness(axes: NDArray, legs: Legs) -> None:
+    """Draw K of ankle and toe into two panels."""
+    for ax, name in zip(axes, ("ankle", "toe"), strict=True):
+        ax.set(title=f"{name.capitalize()} stiffness K", ylabel="N·m/rad")
+        _model(ax, legs, f"{name}_stiffness_Nm_per_rad")
+        ax.set_ylim(0, 1.05 * ax.get_ylim()[1])
 
 
 def _people(ax: Axes, mean: NDArray, sd: NDArray) -> None:
@@ -175,14 +198,19 @@ def _note(ax: Axes, value: float | None, pattern: str, r: float | None) -> None:
     ax.text(1.0, 1.02, ", ".join(parts), transform=ax.transAxes, ha="right", va="bottom", fontsize=8, color="#666666")
 
 
-def _stride_axis(ax: Axes, toe_off: float | None, people_toe_off: float) -> None:
-    """Make percent of the stride the axis of a panel, and mark both toe-offs [%]."""
+def _stride_axis(ax: Axes, toe_off: float | None, people_toe_off: float | None) -> None:
+    """Make percent of the stride the axis of a panel, and mark both toe-offs [%], but for None."""
     ax.set(xlim=(0, 100), xticks=range(0, 101, 20), xlabel="% of stride")
     ax.grid(color="#ededed", lw=0.6)
     ax.axhline(0, color="#bbbbbb", lw=0.7, zorder=0.5)
-    ax.axvline(people_toe_off, color=PEOPLE, lw=0.8, ls=(0, (2, 2)), zorder=0.6)
-    if toe_off is not None:
-        ax.axvline(toe_off, color=MODEL, lw=0.8, ls=(0, (2, 2)), zorder=0.6)
+    for percent, colour in ((people_toe_off, PEOPLE), (toe_off, MODEL)):
+        if percent is not None:
+            ax.axvline(percent, color=colour, lw=0.8, ls=(0, (2, 2)), zorder=0.6)
+
+
+def _handle(colour: str) -> tuple[Patch, Line2D]:
+    """Return the sign of a curve of the model and its spread, for a legend."""
+    return Patch(color=colour, alpha=0.22, lw=0), Line2D([], [], color=colour, lw=1.8)
 
 
 def _header(figure: Figure, recording: Recording, gait: Gait, human: HumanGait) -> None:
@@ -206,10 +234,7 @@ def _header(figure: Figure, recording: Recording, gait: Gait, human: HumanGait) 
     if feet_differ(settings):
         kinds = kinds_of(settings)
         names = {f"left, {kinds['left']}": MODEL, f"right, {kinds['right']}": OTHER_LEG}
-    handles: dict[str, Any] = {
-        f"{name}, mean ± SD over strides": (Patch(color=colour, alpha=0.22, lw=0), Line2D([], [], color=colour, lw=1.8))
-        for name, colour in names.items()
-    }
+    handles: dict[str, Any] = {f"{name}, mean ± SD over strides": _handle(colour) for name, colour in names.items()}
     handles |= {
         f"{reference} at {human.speed:.2f} m/s{note}, mean ± SD": (
             Patch(color=PEOPLE, alpha=0.25, lw=0),

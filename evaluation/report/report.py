@@ -4,7 +4,7 @@ metrics.json                    every number
 gait_cycle.csv, _left, _right   mean curves over percent of stride, and their spread
 strides.npz                     the 100 Hz series behind all of it
 every_stride.csv, .parquet      the curves of each stride
-gait.png, walk.gif              pictures
+gait.png, stiffness.png, walk.gif   pictures
 stiffness_schedule.csv, finite_states.json   K and theta_eq as tables, which are policies again
 walk.mot, walk.sto, external_loads.xml, model.xml   the walk for OpenSim, the body for MuJoCo
 """
@@ -23,7 +23,7 @@ from ..recording.recording import Recording
 from .animation import save_animation
 from .every_stride import write_every_stride
 from .exports import write_model, write_opensim
-from .gait_figure import save_gait_figure
+from .gait_figure import save_gait_figure, save_stiffness_figure
 from .schedule_tables import write_schedules
 
 FILES = (
@@ -35,6 +35,7 @@ FILES = (
     "every_stride.parquet",
     "strides.npz",
     "gait.png",
+    "stiffness.png",
     "walk.gif",
     "stiffness_schedule.csv",
     "finite_states.json",
@@ -55,6 +56,7 @@ def write_report(
     writers: tuple[Callable[[], object], ...] = (
         lambda: _write_numbers(folder, recording, gait),
         lambda: save_gait_figure(folder / "gait.png", recording, gait),
+        lambda: save_stiffness_figure(folder / "stiffness.png", gait),
         lambda: save_animation(folder / "walk.gif", recording),
         lambda: write_every_stride(folder, recording),
         lambda: write_schedules(folder, recording),

@@ -34,6 +34,7 @@ FILES = {
     "strides.npz",
     "every_stride.csv",
     "gait.png",
+    "stiffness.png",
     "walk.gif",
     "stiffness_schedule.csv",
     "finite_states.json",

@@ -1,4 +1,4 @@
-"""gait.png and walk.gif: what is drawn is the walk that was measured, over people."""
+"""gait.png, stiffness.png and walk.gif: what is drawn is the walk that was measured, over people."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from springfoot.evaluation.numbers.metrics import measure
 from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.evaluation.recording.recording import record
 from springfoot.evaluation.report.animation import save_animation
-from springfoot.evaluation.report.gait_figure import save_gait_figure
+from springfoot.evaluation.report.gait_figure import save_gait_figure, save_stiffness_figure
 from springfoot.gait import human_gait
 from springfoot.gait.people.gait_events import PERCENT
 
@@ -29,6 +29,16 @@ def test_the_picture_draws_the_walk_over_people(recording, tmp_path):
     assert has_line(of["Knee angle"], PERCENT, np.degrees(human.mean("knee", PERCENT / 100)))
     assert has_line(of["Ankle moment"], PERCENT, gait.both.mean("ankle_moment_Nm_per_kg"))
     assert has_line(of["Vertical force"], PERCENT, gait.both.mean("grf_vertical_bw"))
+
+
+def test_the_picture_of_the_stiffness_draws_each_foot(recording, tmp_path):
+    gait = measure(recording)
+    with kept_figures() as figures:
+        save_stiffness_figure(tmp_path / "stiffness.png", gait)
+    of = {ax.get_title(loc="left"): ax for ax in figures["stiffness.png"].axes}
+    for curves in gait.feet:
+        assert has_line(of["Ankle stiffness K"], PERCENT, curves.mean("ankle_stiffness_Nm_per_rad"))
+        assert has_line(of["Toe stiffness K"], PERCENT, curves.mean("toe_stiffness_Nm_per_rad"))
 
 
 def test_the_animation_is_two_strides_below_a_megabyte(recording, tmp_path):
