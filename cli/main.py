@@ -67,13 +67,17 @@ STUDIES = {
         "feet.foot_map.FootMap",
         "Which feet does a learned person walk on, and what is it worth to know them?",
     ),
+    "landscape": (
+        "springs.landscape.Landscape",
+        "With which stiffness of ankles and toes does a person walk, fall, and take least?",
+    ),
     "orthosis": ("feet.orthosis.Orthosis", "Which spring beside the ankles helps weak calves?"),
     "prosthesis": ("feet.prosthesis.Prosthesis", "Which stiffness of a passive prosthetic ankle takes least?"),
     "drop-foot": ("feet.drop_foot.DropFoot", "Which spring beside the ankle holds a drop foot?"),
     "play": ("walks.play.Play", "What does a stiffness do to a walk? A recorded page to play with."),
 }
 """Name of each study on the command line -> its class, imported when asked for, and its question."""
-ASKED_BY_USERS = ("compare", "bodies", "identify", "orthosis", "prosthesis", "drop-foot")
+ASKED_BY_USERS = ("compare", "landscape", "identify", "orthosis", "prosthesis", "drop-foot")
 """Studies that help lists; `--all` lists the others too, most of which made tables of this project's docs."""
 
 

@@ -83,11 +83,11 @@ def save_stiffness_figure(path: Path, gait: Gait) -> None:
         _stiffness(axes, legs)
         for ax in axes:
             _stride_axis(ax, gait.metrics["toe_off_percent"], None)
-        handles = {
+        handles: dict[str, Any] = {
             f"{name} foot, mean ± SD over strides": _handle(colour)
             for name, (_, colour) in zip(SIDES, legs, strict=True)
         }
-        figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=2, frameon=False)
+        figure.legend(list(handles.values()), list(handles), loc="outside lower center", ncols=2, frameon=False)
         figure.savefig(path, dpi=130, **PNG)
 
 

@@ -1,0 +1,248 @@
+"""Walk persons with one stiffness at both ankles and another at both toes, over a grid of both and of speeds.
+
+    springfoot study landscape learned
+
+The stiffness stays the same over the whole stride and is set for the person, who knows that and moves hips, knees and
+the springs' rest angles. So the map tells where a walk lies if only its stiffness differs: who falls, undisturbed and
+pushed, what a metre costs at equal walked speed, and how far the walk is from people's.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise, product
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
+
+import matplotlib
+import numpy as np
+import tyro
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from springfoot.agents.policies import find_policy
+from springfoot.errors import require_number
+from springfoot.evaluation.numbers import measure
+from springfoot.evaluation.recording import policy_and_settings, record
+from springfoot.evaluation.report import STYLE
+from springfoot.files.markdown import MISSING, table
+
+from ..base.columns import COMPARED_JOINTS
+from ..base.kept import Kept
+from ..base.study import Answer, OnProgress, WalkingStudy
+from ..feet.walked_speeds import TWO_PRICES, Row, at_walked_speeds, rows_csv
+
+ANKLES = (50.0, 100.0, 150.0, 200.0, 300.0, 400.0)
+"""Stiffness of both ankles [N m/rad] for 1.70 m and 63 kg, up to the tendon's in series."""
+TOES = (7.0, 14.0, 28.0, 56.0, 84.0)
+"""Stiffness of both toes [N m/rad], a quarter to three times that of toes in people."""
+ASKED_SPEEDS = (0.8, 1.0, 1.2, 1.4, 1.6)
+"""Commanded speeds [m/s]."""
+WALKED_SPEEDS = (0.9, 1.1, 1.3)
+"""Walked speeds at which prices are compared [m/s]."""
+NEAR = 0.05
+"""Share by which a price may exceed the least one and not be told apart from it; as `told_apart.GAP` of feet."""
+SPRINGS = ("ankle_N_m_rad", "toe_N_m_rad")
+"""Columns of the two stiffnesses."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Landscape(WalkingStudy):
+    """Walk persons over a grid of ankle and toe stiffness, the same over the stride, at five speeds."""
+
+    persons: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="PERSON ...")] = ("learned",)
+    """Policies that move the person: run folders, files, or `learned`."""
+    episodes: int = 5
+    """Episodes of each cell, and as many pushed."""
+    seconds: float = 12.0
+    """Length of each episode."""
+    push_newton: float = 100.0
+    """Size of the pushes [N]."""
+    keep: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    """File in which the numbers of each cell are kept, to go on after a stop."""
+
+    QUICK: ClassVar[Mapping[str, Any]] = {"episodes": 1, "seconds": 6.0, "keep": None}
+
+    def check(self) -> None:
+        """Refuse counts, lengths and pushes out of range."""
+        super().check()
+        require_number("push_newton", self.push_newton, 0.0, 1000.0, above=True, unit="N")
+
+    @property
+    def total(self) -> float:
+        """Return the simulated time of all walks if none falls [s]."""
+        return 2.0 * len(self.persons) * len(self._cells()) * self.episodes * self.seconds
+
+    def ask(self, progress: OnProgress) -> Answer:
+        """Walk every person in every cell."""
+        kept = Kept(self.keep)
+        walks = []
+        for person, (ankle, toe, speed) in product(self.persons, self._cells()):
+            cell = dict(zip(SPRINGS, (ankle, toe), strict=True))
+            numbers = self._walk(kept, person, f"constant:{ankle:g},{toe:g}", speed, progress)
+            walks.append({"person": person, **cell, "speed_m_s": speed, **numbers})
+        even = at_walked_speeds(walks, ("person", *SPRINGS), (0.9,) if self.quick else WALKED_SPEEDS)
+        least = cheapest(even)
+        files = {
+            "walks.csv": rows_csv(walks),
+            "equal_speeds.csv": rows_csv(even),
+            "least.csv": rows_csv(least),
+            "landscape.png": partial(draw, walks=walks, even=even),
+        }
+        return Answer(text=self._text(walks, least), files=files)
+
+    def _walk(self, kept: Kept, person: str, policy: str, speed: float, progress: OnProgress) -> dict[str, Any]:
+        """Return the numbers of one cell."""
+        given = {"person": str(find_policy(person)), "speed": speed, "episode_seconds": self.seconds}
+
+        def walked(push: float) -> dict[str, Any]:
+            """Return the metrics of the walks pushed by so much."""
+            act, settings = policy_and_settings(policy, {**given, "push_newton": push})
+            return measure(record(act, settings, name=policy, progress=progress, **self.how)).metrics
+
+        def make() -> dict[str, Any]:
+            """Walk undisturbed and pushed; return the numbers."""
+            metrics = walked(0.0)
+            return {
+                "falls": metrics["falls"] / metrics["episodes"],
+                "falls_pushed": walked(self.push_newton)["falls"] / self.episodes,
+                "walked_m_s": metrics["speed_m_s"]["mean"],
+                TWO_PRICES[0]: metrics["effort"]["fibre_J_kg_m"],
+                TWO_PRICES[1]: metrics["effort"]["total"],
+                **{f"{joint}_rmse_deg": metrics["joints"][joint]["rmse_deg"] for joint in COMPARED_JOINTS},
+            }
+
+        return kept.get([{**self.how, "threads": 0}, self.push_newton, policy, given], make)
+
+    def _cells(self) -> Sequence[tuple[float, float, float]]:
+        """Return ankle, toe and commanded speed of each cell."""
+        if self.quick:
+            return list(product(ANKLES[1::2], TOES[1:4:2], (0.8, 1.0)))
+        return list(product(ANKLES, TOES, ASKED_SPEEDS))
+
+    def _text(self, walks: Sequence[Row], least: Sequence[Row]) -> str:
+        """Return the report."""
+        columns = {"undisturbed": "falls", f"pushed by ±{self.push_newton:g} N": "falls_pushed"}
+        falls = ", ".join(f"{_fallen(walks, column)} {name}" for name, column in columns.items())
+        ways = [
+            f"The faster walk has its least {price_name} at a stiffer {joint} in {direction(least, column, price)}."
+            for price, price_name in zip(TWO_PRICES, ("fibre work", "effort"), strict=True)
+            for column, joint in zip(SPRINGS, ("ankle", "toe"), strict=True)
+        ]
+        return "\n\n".join(
+            [
+                "![Fibre work and effort over ankle and toe stiffness](landscape.png)",
+                least_table(least),
+                f"Of {len(walks)} cells somebody falls in {falls}. {' '.join(ways)}",
+                f"{self.what_ran} of each cell. Prices are for a metre where all cells walk equally fast; in brackets "
+                f"the cells that cost at most {100 * NEAR:g} % more than the least.",
+            ]
+        )
+
+
+def _fallen(walks: Sequence[Row], column: str) -> int:
+    """Return the number of cells in which an episode falls."""
+    return sum(row[column] > 0 for row in walks)
+
+
+def cheapest(even: Sequence[Row]) -> list[dict[str, Any]]:
+    """Return the cell of the least price of each person, walked speed and price, from rows of `at_walked_speeds`.
+
+    A row has its ankle's and toe's stiffness, the price, and of both the least and the greatest stiffness of the cells
+    that cost at most `NEAR` more; None where no cell walks.
+    """
+    rows = []
+    for price in TWO_PRICES:
+        for person, speed in dict.fromkeys((row["person"], row["speed_m_s"]) for row in even):
+            here = [row for row in even if (row["person"], row["speed_m_s"]) == (person, speed)]
+            walked = [row for row in here if row[price] is not None]
+            row: dict[str, Any] = {"person": person, "speed_m_s": speed, "price": price, "cells": len(walked)}
+            ends = (f"{column}_{end}" for column in SPRINGS for end in ("from", "to"))
+            row |= dict.fromkeys((*SPRINGS, "least", *ends))
+            if walked:
+                best = min(walked, key=lambda one: one[price])
+                near = [one for one in walked if one[price] <= (1.0 + NEAR) * best[price]]
+                row |= {"least": best[price]}
+                for column in SPRINGS:
+                    values = [one[column] for one in near]
+                    row |= {column: best[column], f"{column}_from": min(values), f"{column}_to": max(values)}
+            rows.append(row)
+    return rows
+
+
+def least_table(least: Sequence[Row]) -> str:
+    """Return the Markdown table of the cells of least price, a line for each person and walked speed; `least` are rows
+    of `cheapest`."""
+    lines = []
+    for person, speed in dict.fromkeys((row["person"], row["speed_m_s"]) for row in least):
+        here = [row for row in least if (row["person"], row["speed_m_s"]) == (person, speed)]
+        lines.append([f"{person}, {speed:g} m/s", *(_cell(row) for row in here)])
+    return table(["walking", "least fibre work: ankle, toe, N·m/rad", "least effort: ankle, toe, N·m/rad"], lines)
+
+
+def _cell(row: Row) -> str:
+    """Return the two stiffnesses of the least price, with the ranges near it, in words."""
+    if row["least"] is None:
+        return MISSING
+    return ", ".join(f"{row[name]:g} ({row[f'{name}_from']:g} to {row[f'{name}_to']:g})" for name in SPRINGS)
+
+
+def direction(least: Sequence[Row], column: str, price: str) -> str:
+    """Return, in words, in how many pairs of neighbouring walked speeds the stiffness `column` of the least price rises
+    and falls with speed, and for how many persons it rises more often than it falls."""
+    rises = falls = pairs = 0
+    persons = list(dict.fromkeys(row["person"] for row in least))
+    agreeing = 0
+    for person in persons:
+        rows = [row for row in least if (row["person"], row["price"]) == (person, price) and row["least"] is not None]
+        rows.sort(key=lambda row: row["speed_m_s"])
+        steps = [fast[column] - slow[column] for slow, fast in pairwise(rows)]
+        up = sum(step > 0 for step in steps)
+        down = sum(step < 0 for step in steps)
+        rises += up
+        falls += down
+        pairs += len(steps)
+        agreeing += up > down
+    return f"{rises} of {pairs} pairs of speeds ({falls} softer), mostly for {agreeing} of {len(persons)} persons"
+
+
+def draw(path: Path, walks: Sequence[Row], even: Sequence[Row]) -> None:
+    """Draw the mean price over persons: a row of panels for each price, one for each walked speed, with a cross on the
+    cells in which somebody falls."""
+    speeds = sorted({row["speed_m_s"] for row in even})
+    ankles, toes = (sorted({row[column] for row in even}) for column in SPRINGS)
+    fallen = {tuple(row[column] for column in SPRINGS) for row in walks if row["falls"]}
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(3.6 * len(speeds), 5.6), layout="constrained")
+        grid = figure.subplots(len(TWO_PRICES), len(speeds), squeeze=False)
+        for axes, price, label in zip(grid, TWO_PRICES, ("fibre work, J/kg/m", "effort, –"), strict=True):
+            for ax, speed in zip(axes, speeds, strict=True):
+                prices = np.full((len(toes), len(ankles)), np.nan)
+                for (row, toe), (column, ankle) in product(enumerate(toes), enumerate(ankles)):
+                    here = [
+                        one[price] for one in even if (*map(one.get, SPRINGS), one["speed_m_s"]) == (ankle, toe, speed)
+                    ]
+                    if None not in here:
+                        prices[row, column] = np.mean(here)
+                _panel(ax, prices, ankles, toes, fallen)
+                ax.set_title(f"{label}, walking {speed:g} m/s")
+        for ax in grid[-1]:
+            ax.set_xlabel("ankle, N·m/rad")
+        for ax in grid[:, 0]:
+            ax.set_ylabel("toe, N·m/rad")
+        figure.savefig(path, dpi=110, facecolor="white", metadata={"Software": "springfoot"})
+
+
+def _panel(
+    ax: Axes, prices: Any, ankles: Sequence[float], toes: Sequence[float], fallen: set[tuple[float, ...]]
+) -> None:
+    """Draw one panel: prices (toes, ankles), their values inside, the least one framed."""
+    ax.imshow(prices, origin="lower", aspect="auto", cmap="viridis_r")
+    for (row, toe), (column, ankle) in product(enumerate(toes), enumerate(ankles)):
+        value = prices[row, column]
+        known = np.isfinite(value)
+        text = f"{value:.2f}" if known else "×" if (ankle, toe) in fallen else "–"
+        bold = known and value == np.nanmin(prices)
+        ax.text(column, row, text, ha="center", va="center", fontsize=7, fontweight="bold" if bold else None)
+    ax.set_xticks(range(len(ankles)), [f"{k:g}" for k in ankles])
+    ax.set_yticks(range(len(toes)), [f"{k:g}" for k in toes])

@@ -1,0 +1,80 @@
+"""The landscape of stiffness: a planted least price, its neighbourhood, directions with their sign, and kept cells."""
+
+import json
+
+import pytest
+
+from springfoot.cli.main import study_main
+from springfoot.studies.feet.walked_speeds import TWO_PRICES
+from springfoot.studies.springs.landscape import ANKLES, NEAR, TOES, cheapest, direction, least_table
+
+FIBRE, EFFORT = TWO_PRICES
+
+
+def bowl(best_ankle, best_toe, *, speed=1.1, person="one", missing=()):
+    """Return rows at equal walked speed whose fibre work is least, 3 J/kg/m, at one cell; effort falls with both."""
+    return [
+        {
+            "person": person,
+            "ankle_N_m_rad": ankle,
+            "toe_N_m_rad": toe,
+            "speed_m_s": speed,
+            FIBRE: None if (ankle, toe) in missing else 3.0 + abs(ankle - best_ankle) / 500 + abs(toe - best_toe) / 50,
+            EFFORT: None if (ankle, toe) in missing else 5.0 - ankle / 1000 - toe / 1000,
+        }
+        for ankle in ANKLES
+        for toe in TOES
+    ]
+
+
+def test_the_cheapest_cell_is_the_one_planted_with_the_cells_near_it():
+    fibre, effort = cheapest(bowl(150.0, 28.0))
+    assert (fibre["ankle_N_m_rad"], fibre["toe_N_m_rad"], fibre["least"]) == (150.0, 28.0, 3.0)
+    # 3 J/kg/m and NEAR of it reach as far as 75 N m/rad of the ankle alone; no other toe lies within 7.5 N m/rad.
+    assert NEAR * 3.0 * 500 == pytest.approx(75)
+    assert (fibre["ankle_N_m_rad_from"], fibre["ankle_N_m_rad_to"]) == (100.0, 200.0)
+    assert (fibre["toe_N_m_rad_from"], fibre["toe_N_m_rad_to"]) == (28.0, 28.0)
+    assert (effort["ankle_N_m_rad"], effort["toe_N_m_rad"]) == (ANKLES[-1], TOES[-1])
+
+
+def test_a_cell_that_falls_is_not_the_cheapest_and_a_map_of_falls_has_none():
+    (fibre, _) = cheapest(bowl(150.0, 28.0, missing={(150.0, 28.0)}))
+    assert fibre["ankle_N_m_rad"] in (100.0, 200.0) and fibre["cells"] == len(ANKLES) * len(TOES) - 1
+    everywhere = {(ankle, toe) for ankle in ANKLES for toe in TOES}
+    rows = cheapest(bowl(150.0, 28.0, missing=everywhere))
+    assert {row["least"] for row in rows} == {None}
+    assert "| one, 1.1 m/s | – | – |" in least_table(rows)
+
+
+def test_directions_have_their_sign_and_count_persons():
+    even = [
+        row
+        for person, ankles in (("one", (100.0, 150.0, 200.0)), ("two", (200.0, 150.0, 150.0)))
+        for ankle, speed in zip(ankles, (0.9, 1.1, 1.3), strict=True)
+        for row in bowl(ankle, 28.0, speed=speed, person=person)
+    ]
+    least = cheapest(even)
+    assert direction(least, "ankle_N_m_rad", FIBRE) == "2 of 4 pairs of speeds (1 softer), mostly for 1 of 2 persons"
+    assert direction(least, "toe_N_m_rad", FIBRE) == "0 of 4 pairs of speeds (0 softer), mostly for 0 of 2 persons"
+
+
+@pytest.mark.slow
+def test_kept_cells_are_not_walked_again(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("springfoot.studies.springs.landscape.ANKLES", (200.0,))
+    monkeypatch.setattr("springfoot.studies.springs.landscape.TOES", (28.0,))
+    monkeypatch.setattr("springfoot.studies.springs.landscape.ASKED_SPEEDS", (1.0, 1.2))
+    words = ["landscape", "--episodes", "1", "--seconds", "6", "--keep", str(tmp_path / "kept.json")]
+    assert study_main([*words, "--out", str(tmp_path / "first")]) == 0
+    kept = json.loads((tmp_path / "kept.json").read_text())
+    assert len(kept) == 2
+    monkeypatch.setattr("springfoot.studies.springs.landscape.record", None)  # walking again would fail
+    assert study_main([*words, "--out", str(tmp_path / "second")]) == 0
+    assert (tmp_path / "first/walks.csv").read_bytes() == (tmp_path / "second/walks.csv").read_bytes()
+    assert "somebody falls in 0 undisturbed" in capsys.readouterr().out
+
+
+def test_a_bad_push_is_one_line(capsys):
+    assert study_main(["landscape", "--push-newton", "0"]) == 2
+    assert capsys.readouterr().err == (
+        "springfoot study landscape: error: push_newton must be a finite number > 0 and <= 1000 N, got 0.0\n"
+    )
