@@ -44,6 +44,7 @@ OTHER_SPEED = 0.1
 """How much slower the second walk is asked for, as a share: walks with hindrances are slower than asked for."""
 PRICE_NAMES = dict(zip(TWO_PRICES, ("fibre work", "effort"), strict=True))
 """Column of a price -> its name."""
+WHICH_PRICE = "Where the two differ, follow fibre work: its changes are held against people's, effort's are not."
 CANNOT_SAY = """- It is a body in a plane: nothing here is about comfort, pain, or balance to the side.
 - The person has adapted to all feet at once; one who wears a single foot for weeks may walk cheaper on it.
 - Read differences, not the price itself. A missing ankle comes out cheaper here than a sound one; people pay more."""
@@ -229,7 +230,7 @@ class FootChoice(WalkingStudy):
         ]
         return "\n\n".join(
             [
-                f"**{verdicts[0]}** {verdicts[1]}",
+                f"**{verdicts[0]}** {verdicts[1]} {WHICH_PRICE}",
                 table(head, lines),
                 self._how(names[0], speed),
                 f"What this cannot say:\n\n{CANNOT_SAY}",
