@@ -17,11 +17,11 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 import tyro
 
-from springfoot.agents.training import PRESETS, TrainingConfig, is_finished
+from springfoot.agents.training import PRESETS, Engine, TrainingConfig, is_finished, train_missing
 from springfoot.envs.control import GRID, PLATEAUS, LegConstants, foot_curves, reference_walk_at
 from springfoot.envs.physics import ACTION_STEP
 from springfoot.envs.settings import BipedSettings, settings_from, settings_to_json
-from springfoot.errors import SpringfootError
+from springfoot.errors import SpringfootError, require_count
 from springfoot.evaluation.report import people_metrics
 from springfoot.files.markdown import MISSING, plus_minus, table, text_of
 from springfoot.files.writing import csv_text
@@ -30,8 +30,7 @@ from springfoot.gait.springs import SPRINGS, Segment, StiffnessSchedule
 
 from ..base.columns import COMPARED_JOINTS, Column
 from ..base.pushed_walks import PushedWalks, kept_metrics
-from ..base.study import Answer, OnProgress
-from ..base.training_study import TrainingStudy
+from ..base.study import Answer, OnProgress, WalkingStudy
 
 ABLATIONS: dict[str, dict[str, Any]] = {
     "walk": {},
@@ -233,7 +232,7 @@ def ablations_csv(tables: dict[str, Rows]) -> str:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Ablations(TrainingStudy):
+class Ablations(WalkingStudy):
     """Train preset `walk` without each of its parts, and measure the contribution of each.
 
     A finished seed is neither trained nor measured again: the command may be stopped and started again.
@@ -241,6 +240,15 @@ class Ablations(TrainingStudy):
 
     runs: Annotated[Path, tyro.conf.arg(metavar="FOLDER")] = Path("runs/ablations")
     """Folder of all trainings and their metrics; finished ones are kept."""
+    seeds: int = 3
+    """Seeds of each training, 0 and the next ones."""
+    timesteps: int | None = None
+    """Steps of 20 ms of each training, the preset's unless given."""
+    engine: Engine = "here"
+    """Where missing seeds are trained: in processes on this machine, or on a Ray cluster (extra `rllib`) whose nodes
+    share the folder of the trainings."""
+    train: bool = True
+    """Train missing seeds; without, use the finished ones."""
     only: tuple[str, ...] = ()
     """Rows to train, all of them unless given."""
     constant: Annotated[tuple[float, float] | None, tyro.conf.arg(metavar="ANKLE TOE")] = None
@@ -249,13 +257,16 @@ class Ablations(TrainingStudy):
     """Size of the pushes [N]."""
 
     QUICK: ClassVar[dict[str, Any]] = {
-        **TrainingStudy.QUICK,
-        **{"runs": Path("runs/ablations-quick"), "only": ("walk",)},
+        **WalkingStudy.QUICK,
+        **{"seeds": 1, "timesteps": 8192, "runs": Path("runs/ablations-quick"), "only": ("walk",)},
     }
 
     def check(self) -> None:
-        """Refuse unknown rows."""
+        """Refuse counts out of range and unknown rows."""
         super().check()
+        require_count("seeds", self.seeds)
+        if self.timesteps is not None:
+            require_count("timesteps", self.timesteps)
         for name in self.only:
             if name not in ABLATIONS:
                 raise SpringfootError(f"no row {name!r}; there are {', '.join(ABLATIONS)}")
@@ -273,7 +284,7 @@ class Ablations(TrainingStudy):
     def ask(self, progress: OnProgress) -> Answer:
         """Train missing seeds, and measure trained policies, springs and inputs."""
         walks = PushedWalks(seconds=self.seconds, push_newton=self.push_newton, progress=progress, **self.how)
-        failed = self.train_missing(jobs(self.runs, self.only or tuple(ABLATIONS), self.seeds, self.timesteps))
+        failed = self._train()
         trained = measure_trained(self.runs, walks)
         of_springs = measure_springs(self.runs, walks, self.constant)
         learned = {"walk": "learned, planned θ_eq", "neutral": "learned, constant θ_eq"}
@@ -285,3 +296,12 @@ class Ablations(TrainingStudy):
         texts = {name: rows_table(rows, heads[name], people=name == "SPRINGS") for name, rows in tables.items()}
         text = "\n\n".join([*texts.values(), note])
         return Answer(text=text, files={"ablations.csv": ablations_csv(tables)}, failed=failed)
+
+    def _train(self) -> bool:
+        """Train what is not finished; return True if a training failed. Raises `KeyboardInterrupt` if the user stopped
+        it."""
+        missing = jobs(self.runs, self.only or tuple(ABLATIONS), self.seeds, self.timesteps)
+        status = train_missing(missing, self.engine) if self.train else "finished"
+        if status == "interrupted":
+            raise KeyboardInterrupt
+        return status == "failed"
