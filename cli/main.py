@@ -74,7 +74,7 @@ STUDIES = {
     "orthosis": ("feet.orthosis.Orthosis", "Which spring beside the ankles helps weak calves?"),
     "prosthesis": ("feet.prosthesis.Prosthesis", "Which stiffness of a passive prosthetic ankle takes least?"),
     "drop-foot": ("feet.drop_foot.DropFoot", "Which spring beside the ankle holds a drop foot?"),
-    "play": ("walks.play.Play", "What does a stiffness do to a walk? A recorded page to play with."),
+    "walks": ("feet.walks.Walks", "How does a learned person walk on each foot? A page of recorded walks."),
 }
 """Name of each study on the command line -> its class, imported when asked for, and its question."""
 ASKED_BY_USERS = ("compare", "landscape", "identify", "orthosis", "prosthesis", "drop-foot")

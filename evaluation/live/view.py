@@ -53,6 +53,7 @@ FOOT_SLIDERS = {
     "ankle_stiffness": ("ankle K, N·m/rad", 10.0),
     "ankle_deg": ("ankle θ_eq, deg", 0.5),
     "toe_stiffness": ("toe K, N·m/rad", 5.0),
+    "toe_deg": ("toe θ_eq, deg", 0.5),
     "strength": ("strength", 0.05),
     f"{ORTHOSIS}.ankle_stiffness": ("orthosis, N·m/rad", 10.0),
     f"{ORTHOSIS}.ankle_deg": ("orthosis θ_eq, deg", 0.5),

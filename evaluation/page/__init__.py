@@ -1,4 +1,4 @@
-"""Write the pages that a browser opens offline: report.html and play.html."""
+"""Write the pages that a browser opens offline: report.html and walks.html."""
 
 from typing import TYPE_CHECKING
 
@@ -6,21 +6,21 @@ from springfoot.lazy import lazy_names
 
 if TYPE_CHECKING:
     from .page_figure import foot_words
-    from .play import Grid, play_page
-    from .play_data import episodes_of
     from .report_page import PAGE_PACKAGES, write_page
+    from .walks import Grid, Walk, walk_of, walks_page
 
-__all__ = ["PAGE_PACKAGES", "Grid", "episodes_of", "foot_words", "play_page", "write_page"]
+__all__ = ["PAGE_PACKAGES", "Grid", "Walk", "foot_words", "walk_of", "walks_page", "write_page"]
 
 if not TYPE_CHECKING:  # a type checker would take it to mean that any name exists
     __getattr__ = lazy_names(
         __name__,
         {
             "PAGE_PACKAGES": "report_page",
-            "Grid": "play",
-            "episodes_of": "play_data",
+            "Grid": "walks",
+            "Walk": "walks",
             "foot_words": "page_figure",
-            "play_page": "play",
+            "walk_of": "walks",
+            "walks_page": "walks",
             "write_page": "report_page",
         },
     )

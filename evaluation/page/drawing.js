@@ -189,7 +189,8 @@ function walker(parent, policy, i) {
   const f = policy.figure, frames = f.base.length, size = f.height / 1.7, L = f.lengths;
   const figure = make(parent, "figure"), svg = draw(figure, "svg", { viewBox: "0 0 400 360", role: "img", "aria-label": `${policy.name}, animated` });
   const scale = 155 / size, floor = 325;
-  make(figure, "figcaption", `${policy.name}: left foot ${f.feet[0].words}, right foot ${f.feet[1].words}`);
+  const [left_foot, right_foot] = f.feet.map(each => each.words);
+  make(figure, "figcaption", `${policy.name}: ${left_foot === right_foot ? `both feet ${left_foot}` : `left foot ${left_foot}, right foot ${right_foot}`}`);
   const ground = draw(svg, "line", { stroke: "var(--faint)", x1: 0, x2: 400 }), marks = draw(svg, "g", {});
   const layer = draw(svg, "g", { "stroke-linecap": "round", "stroke-linejoin": "round" });
   const line = (width, shade) => draw(layer, "polyline", { fill: "none", stroke: shade, "stroke-width": width * size * scale });

@@ -82,6 +82,16 @@ def _prices(price: str, walks: Sequence[Sequence[_Walk]]) -> NDArray:
     return np.array([[walk.prices(price) for walk in at_speed] for at_speed in walks])
 
 
+def named_feet(values: Sequence[str]) -> dict[str, Any]:
+    """Return name -> setting of the feet of `values` of a flag: kinds, JSON or files, named by their words or file."""
+    named = {}
+    for words in values:
+        foot = read_foot_flag(words)
+        name = Path(words).stem if Path(words).suffix else foot_words(settings_from(left_foot=foot).left_foot)
+        named[name] = foot
+    return named
+
+
 @dataclass(frozen=True, kw_only=True)
 class FootChoice(WalkingStudy):
     """Which foot for this person? Walks learned persons on every foot, and tells which takes least.
@@ -137,12 +147,7 @@ class FootChoice(WalkingStudy):
         """Return name -> setting of each foot."""
         if self.spring:
             return {f"{k:g} N·m/deg": braced_calf(self.calf or 1.0, k, self.rest_deg) for k in self.spring}
-        named = {}
-        for words in self.foot:
-            foot = read_foot_flag(words)
-            name = Path(words).stem if Path(words).suffix else foot_words(settings_from(left_foot=foot).left_foot)
-            named[name] = foot
-        return named
+        return named_feet(self.foot)
 
     @property
     def total(self) -> float:

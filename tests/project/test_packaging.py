@@ -135,7 +135,7 @@ def test_pages_in_the_wheel_lead_to_what_it_holds(wheel):
     ]
     assert dead == []
     live = pages["springfoot/docs/how-to/live.md"]
-    assert "[learned person](person.md)" in live and "png)" not in live and "\nplay.html is one file" in live
+    assert "[learned person](person.md)" in live and "png)" not in live and "\nwalks.html is one file" in live
 
 
 def test_links_that_a_page_keeps_and_those_that_lead_to_the_repository():

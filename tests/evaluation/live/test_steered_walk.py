@@ -188,6 +188,7 @@ def with_person():
         ("passive", {"left_foot.ankle_stiffness": 300.0}, "ankle", "device.stiffness", 300.0),
         ("passive", {"left_foot.ankle_deg": 6.0}, "ankle", "device.rest", np.radians(6.0)),
         ("passive", {"left_foot.toe_stiffness": 90.0}, "toe", "device.stiffness", 90.0),
+        ("passive", {"left_foot.toe_deg": 8.0}, "toe", "device.rest", np.radians(8.0)),
         ("adaptive", {"left_foot.ankle_deg": 5.0}, "ankle", "rest", np.radians(5.0)),
         ("weak", {"left_foot.strength": 0.5}, "ankle", "strength", 0.5),
         ("intact", {"left_foot.orthosis.ankle_stiffness": 200.0}, "ankle", "orthosis.stiffness", 200.0),

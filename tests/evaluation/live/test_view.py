@@ -202,7 +202,8 @@ def test_inputs_of_feet_are_there_where_they_do_something_and_a_load_is_a_box(vi
     assert shown("left_foot") == shown("right_foot") == everywhere
     view._requests.put({"left_foot.kind": "passive"})
     view._requests.put({"left_foot.ankle_stiffness": 450.0, "carried_ratio": 0.1})
-    assert reaches(lambda: shown("left_foot") == everywhere | {"ankle_stiffness", "ankle_deg", "toe_stiffness"})
+    numbers = {"ankle_stiffness", "ankle_deg", "toe_stiffness", "toe_deg"}
+    assert reaches(lambda: shown("left_foot") == everywhere | numbers)
     assert handles["left_foot.ankle_stiffness"].value == 450.0
     assert reaches(lambda: any(isinstance(handle, viser.BoxHandle) for handle in list(drawn.values())))
     view._requests.put({"left_foot.kind": "weak", "left_foot.orthosis.ankle_stiffness": 90.0})
