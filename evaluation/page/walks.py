@@ -46,7 +46,7 @@ PANELS = {
 """Title -> column of the curves over the stride, unit, and people's curve behind it."""
 BODY_PARTS = {"base": 3, "angle": 8, "com": 2, "plan": 2, "zmp": 1, "forward": 2, "up": 2, "lever": 2, "stiffness": 4}
 """Part of the drawing -> number of its columns; see `_figure_series`."""
-WALK_COLUMNS = (
+STRIDE_COLUMNS = (
     *(name for name, size in BODY_PARTS.items() for _ in range(size)),
     *(title for title in PANELS for _ in SIDES),
 )
@@ -131,7 +131,7 @@ def walks_page(
 
 
 def mean_stride(walk: Walk) -> tuple[dict[str, Any], NDArray] | None:
-    """Return the mean stride of a walk: its numbers, and its series (MOMENTS, len(WALK_COLUMNS)); None without one.
+    """Return the mean stride of a walk: its numbers, and its series (MOMENTS, len(STRIDE_COLUMNS)); None without one.
 
     The stride is the left leg's after the warm-up, over the episodes without a fall. Positions are forward of the hip,
     which moves on by `length` [m] in `seconds` [s].
@@ -167,7 +167,7 @@ def mean_stride(walk: Walk) -> tuple[dict[str, Any], NDArray] | None:
 
 def fall_of(walk: Walk) -> tuple[dict[str, Any], NDArray] | None:
     """Return the last moments of the longest episode that fell: its numbers, and its series (MOMENTS,
-    len(WALK_COLUMNS)), in which curves are 0; None if no episode fell.
+    len(STRIDE_COLUMNS)), in which curves are 0; None if no episode fell.
 
     A walk without a fall and without a stride of both legs is shown as a fall.
     """
@@ -182,7 +182,7 @@ def fall_of(walk: Walk) -> tuple[dict[str, Any], NDArray] | None:
     sampled[:, 0] -= sampled[0, 0]
     reason = str(recording.fall_reason[recording.example]) or "no stride of both legs"
     numbers = {"seconds": seconds, "length": 0.0, "reason": reason, "after": end}
-    return numbers, np.concatenate([sampled, np.zeros((MOMENTS, len(WALK_COLUMNS) - sampled.shape[1]))], axis=-1)
+    return numbers, np.concatenate([sampled, np.zeros((MOMENTS, len(STRIDE_COLUMNS) - sampled.shape[1]))], axis=-1)
 
 
 def episodes_of(recording: Recording, rows: NDArray) -> Recording:
@@ -227,7 +227,7 @@ def packed(series: Sequence[NDArray]) -> dict[str, Any]:
     integers = np.round(fraction * LARGEST).astype("<u2")
     return {
         "samples": MOMENTS,
-        "columns": WALK_COLUMNS,
+        "columns": STRIDE_COLUMNS,
         "low": shown_numbers(low),
         "high": shown_numbers(high),
         "data": b64encode(integers.tobytes()).decode(),

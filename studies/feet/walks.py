@@ -15,7 +15,7 @@ import tyro
 
 from springfoot.errors import SpringfootError, require_count
 from springfoot.evaluation.page import PAGE_PACKAGES, Grid, Walk, walk_of, walks_page
-from springfoot.evaluation.recording import BATCH, WARM_UP, record_feet
+from springfoot.evaluation.recording import BATCH, WARM_UP, policy_label, record_feet
 from springfoot.files.markdown import table, text_of
 from springfoot.files.provenance import versions_and_commit
 
@@ -27,9 +27,9 @@ from .orthosis import braced_calf
 from .walked_speeds import rows_csv
 
 PAGE_NAME = "walks.html"
-FEET: Mapping[str, Mapping[str, Any]] = {
+PAGE_FEET: Mapping[str, Mapping[str, Any]] = {
     "sound": {},
-    "weak calves, 25 %": dict.fromkeys(SIDES_OF["both"], braced_calf(0.25, 0.0)),
+    "weak calves, 25 %": {side: {"kind": "weak", "strength": 0.25} for side in SIDES_OF["both"]},
     "weak calves, springs of 3 N·m/deg": dict.fromkeys(SIDES_OF["both"], braced_calf(0.25, 3.0)),
     "right foot passive, 300 N·m/rad": {"right_foot": {"kind": "passive", "ankle_stiffness": 300.0}},
     "right foot passive, 600 N·m/rad": {"right_foot": {"kind": "passive", "ankle_stiffness": 600.0}},
@@ -41,11 +41,11 @@ FEET: Mapping[str, Mapping[str, Any]] = {
 }
 """Feet of the page unless the user names others: name -> settings. Each hindrance stands before the same with a spring;
 docs/results/feet.md has the springs."""
-COLUMNS = {
+PAGE_COLUMNS = {
     "walked, m/s": "speed_m_s",
     "fibre work, J/kg/m": "fibre_J_kg_m",
     "push-off, J/kg": "push_off_J_kg",
-    "peak, BW": "sound_peak_bw",
+    "peak force, BW": "sound_peak_bw",
 }
 """Heading of the page's table -> number of `FOOT_NUMBERS`."""
 
@@ -89,7 +89,7 @@ class Walks(WalkingStudy):
     def feet(self) -> Mapping[str, Mapping[str, Any]]:
         """Return name -> settings of each foot."""
         if not self.foot:
-            return FEET
+            return PAGE_FEET
         return {name: dict.fromkeys(SIDES_OF[self.side], foot) for name, foot in named_feet(self.foot).items()}
 
     @property
@@ -104,12 +104,13 @@ class Walks(WalkingStudy):
 
     def ask(self, progress: OnProgress) -> Answer:
         """Walk at every mass and speed on every foot, and write the page."""
+        person = policy_label(self.person)
         walks: list[Walk] = []
         for mass, speed in product(self.mass, self.speed):
             given = {"mass": mass, "speed": speed, "episode_seconds": self.seconds}
             act, settings = person_and_settings(self.person, given)
             feet = list(self.feet.values())
-            recordings = record_feet(act, settings, feet, name=self.person, progress=progress, **self.how)
+            recordings = record_feet(act, settings, feet, name=person, progress=progress, **self.how)
             walks.extend(map(walk_of, recordings))
         side = self.side if self.foot else "right"
         numbers = [dict.fromkeys(FOOT_NUMBERS) if walk.gait is None else numbers_of(walk.gait, side) for walk in walks]
@@ -119,14 +120,15 @@ class Walks(WalkingStudy):
             {"mass_kg": mass, "asked_m_s": speed, "foot": foot, **of_walk, "falls": fell / self.episodes}
             for (mass, speed, foot), of_walk, fell in zip(product(*self.grid), numbers, falls.tolist(), strict=True)
         ]
-        texts = [[text_of(of_walk[key], ".2f") for key in COLUMNS.values()] for of_walk in numbers]
+        texts = [[text_of(of_walk[key], ".2f") for key in PAGE_COLUMNS.values()] for of_walk in numbers]
+        episodes = f"{self.episodes} episode{'s' * (self.episodes > 1)} of {self.seconds:g} s"
         words = (
-            f"The person {self.person} walked {self.episodes} episode{'s' * (self.episodes > 1)} of {self.seconds:g} s "
-            "on each foot, at each mass and speed, on level ground, 1.70 m tall."
+            f"A learned person ({person}) walked {episodes} on each foot, at each mass and speed, on level ground, "
+            "1.70 m tall."
         )
         versions = (f"{name} {number}" for name, number in versions_and_commit(PAGE_PACKAGES)["versions"].items())
         made_by = "\n".join([f"command: {without_places(self.command)}", f"seeds from {self.seed} on", *versions])
-        page = walks_page(self.grid, walks, list(COLUMNS), texts, words, made_by)
+        page = walks_page(self.grid, walks, list(PAGE_COLUMNS), texts, words, made_by)
         by_foot = falls.reshape(len(self.mass), len(self.speed), -1).T  # (feet, speeds, masses)
         lines = [
             [foot, *(f"{' / '.join(map(str, counts))} of {self.episodes}" for counts in by_speed)]

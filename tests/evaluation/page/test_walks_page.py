@@ -13,10 +13,10 @@ import pytest
 from springfoot.cli.main import main
 from springfoot.errors import SpringfootError
 from springfoot.evaluation.numbers.metrics import measure
-from springfoot.evaluation.page.walks import LARGEST, MOMENTS, WALK_COLUMNS, fall_of, mean_stride, walk_of
+from springfoot.evaluation.page.walks import LARGEST, MOMENTS, STRIDE_COLUMNS, fall_of, mean_stride, walk_of
 from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.evaluation.recording.recording import record
-from springfoot.studies.feet.walks import COLUMNS, FEET, Walks
+from springfoot.studies.feet.walks import PAGE_COLUMNS, PAGE_FEET, Walks
 
 COMMITTED = Path(__file__).parents[3] / "docs" / "walks.html"
 FEET_FLAGS = ["--foot", "intact", "--foot", '{"kind": "passive", "ankle_stiffness": 300}', "--foot", "drop"]
@@ -34,7 +34,7 @@ def data_of(page):
 def series_of(data):
     """(strides and falls, MOMENTS, columns)"""
     series = data["series"]
-    whole = np.frombuffer(base64.b64decode(series["data"]), "<u2").reshape(-1, MOMENTS, len(WALK_COLUMNS))
+    whole = np.frombuffer(base64.b64decode(series["data"]), "<u2").reshape(-1, MOMENTS, len(STRIDE_COLUMNS))
     return np.array(series["low"]) + whole / LARGEST * (np.array(series["high"]) - np.array(series["low"]))
 
 
@@ -63,7 +63,7 @@ def test_a_walk_is_its_mean_stride(recording):
     numbers, series = stride
     gait = measure(recording)
     assert numbers["length"] / numbers["seconds"] == pytest.approx(gait.metrics["speed_m_s"]["mean"], rel=0.02)
-    column = {name: WALK_COLUMNS.index(name) for name in WALK_COLUMNS}
+    column = {name: STRIDE_COLUMNS.index(name) for name in STRIDE_COLUMNS}
     assert series[:, column["Knee angle"]] == pytest.approx(gait.feet[0].mean("knee_flexion_deg")[::2])
     assert series[:, column["Knee angle"] + 1] == pytest.approx(gait.feet[1].mean("knee_flexion_deg")[::2])
     assert np.degrees(series[:, column["angle"] + 1]) == pytest.approx(series[:, column["Knee angle"]], abs=1e-3)
@@ -106,13 +106,13 @@ def test_the_page_holds_every_foot_mass_and_speed(page):
     ]
     parts = [part for cell in cells for part in (cell["stride"], cell["fall"]) if part]
     assert [part["series"] for part in parts] == list(range(len(series)))
-    right_ankle = WALK_COLUMNS.index("stiffness") + 2
+    right_ankle = STRIDE_COLUMNS.index("stiffness") + 2
     assert series[cells[1]["stride"]["series"], :, right_ankle] == pytest.approx(300.0, rel=1e-3)
     with (page.parent / "walks.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     for cell, row in zip(cells, rows, strict=True):
         assert float(row["falls"]) == cell["falls"] / 2
-        told = [f"{float(row[key]):.2f}" if row[key] else "–" for key in COLUMNS.values()]
+        told = [f"{float(row[key]):.2f}" if row[key] else "–" for key in PAGE_COLUMNS.values()]
         assert cell["numbers"] == told and (told[0] == "–") == (cell["stride"] is None)
         if cell["stride"]:
             own_speed = cell["stride"]["length"] / cell["stride"]["seconds"]
@@ -148,13 +148,15 @@ def test_bad_grids_are_refused(wrong, said):
 
 
 def opened(browser, page, width, **how):
-    """A tab with the page, what its console told and what it asked for."""
+    """A tab with the page, one foot shown, what its console told and what it asked for."""
     tab = browser.new_page(viewport={"width": width, "height": 900}, **how)
     told, asked = [], []
     tab.on("console", lambda message: told.append(message.text))
     tab.on("pageerror", lambda error: told.append(str(error)))
     tab.on("request", lambda request: asked.append(request.url))
     tab.goto(page.as_uri())
+    assert tab.locator("figcaption").count() == 2  # the first foot, and the second beside it
+    tab.locator("#beside").select_option(index=0)
     return tab, told, asked
 
 
@@ -252,8 +254,12 @@ def test_the_committed_page_is_the_studys_of_this_script(page):
     own, made = data_of(COMMITTED), (COMMITTED.read_text(encoding="utf-8"), page.read_text(encoding="utf-8"))
     study = Walks()
     grid = own["grid"]
-    assert (tuple(grid["mass"]), tuple(grid["speed"]), tuple(grid["foot"])) == (study.mass, study.speed, tuple(FEET))
-    assert len(own["cells"]) == len(study.mass) * len(study.speed) * len(FEET)
+    assert (tuple(grid["mass"]), tuple(grid["speed"]), tuple(grid["foot"])) == (
+        study.mass,
+        study.speed,
+        tuple(PAGE_FEET),
+    )
+    assert len(own["cells"]) == len(study.mass) * len(study.speed) * len(PAGE_FEET)
     without_data = [re.sub(r'id="data">.*?</script>', "", text, flags=re.DOTALL) for text in made]
     assert without_data[0] == without_data[1]
     assert "command: springfoot study walks\n" in own["made"]
