@@ -20,6 +20,7 @@ COMMANDS = {
     "live": "live.LiveFlags",
     "feet": "feet.FootChoice",
     "person": "person.Person",
+    "score": "score.Score",
     "export": "export.ExportFlags",
     "datasets": "datasets.DatasetsFlags",
     "examples": "examples.ExamplesFlags",

@@ -24,7 +24,19 @@ FIRST = """To begin with:
 
 springfoot --help lists all commands."""
 """Commands that a newcomer types, in their order."""
-COMMANDS = ("train", "evaluate", "live", "feet", "person", "export", "study", "datasets", "examples", "completion")
+COMMANDS = (
+    "train",
+    "evaluate",
+    "live",
+    "feet",
+    "person",
+    "score",
+    "export",
+    "study",
+    "datasets",
+    "examples",
+    "completion",
+)
 """Names of all commands."""
 HELP = f"""usage: springfoot {{{",".join(COMMANDS)}}} ...
 
@@ -33,6 +45,7 @@ HELP = f"""usage: springfoot {{{",".join(COMMANDS)}}} ...
   springfoot live POLICY            walk it in a browser, its stiffness, speed, slope, body and feet under sliders
   springfoot feet                   which spring or foot takes a person least? such as --spring 0 2 4 6
   springfoot person FILE ...        how stiff is this person? ankle and toe from their motion files
+  springfoot score FILE ...         how human is any gait? motion files of a walk held against people
   springfoot export POLICY          write it as an ONNX file, which runs without springfoot
   springfoot study NAME             hold many walks against each other; springfoot study --help lists some
   springfoot datasets               write Minari sets of walks, for offline learning
@@ -114,6 +127,10 @@ def _run(words: list[str]) -> int:
                 from .person import person_main
 
                 return person_main(rest)
+            case ["score", *rest]:
+                from .score import score_main
+
+                return score_main(rest)
             case ["export", *rest]:
                 from .export import export_main
 

@@ -22,6 +22,7 @@ COMMANDS = [
     ("`springfoot live`", "steer a walk in a browser"),
     ("`springfoot feet`", "compare springs or feet on a learned person"),
     ("`springfoot person`", "tell one person's quasi-stiffness from their motion files"),
+    ("`springfoot score`", "hold any gait's motion files against people"),
     ("`springfoot export`", "write a policy as an ONNX file"),
     ("`springfoot datasets`", "write Minari sets of walks, for offline learning"),
     ("`springfoot examples`", "list or copy programs to start from"),

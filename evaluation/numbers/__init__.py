@@ -7,13 +7,16 @@ from springfoot.lazy import lazy_names
 if TYPE_CHECKING:
     from .criteria import HUMAN_LIKE, NO_FALLS, WALKS, Criterion, number_text, unmet, with_derived
     from .effort import effort_numbers, mean_effort, stiffness_charge
+    from .likeness import ANGLES, MOMENTS, gait_numbers
     from .metrics import MOMENT_CURVES, Gait, measure
     from .per_leg import asymmetry, leg_numbers
     from .series import foot_contacts, mean_speed, strides_within
     from .tally import StrideTally, add_episode
 
 __all__ = [
+    "ANGLES",
     "HUMAN_LIKE",
+    "MOMENTS",
     "MOMENT_CURVES",
     "NO_FALLS",
     "WALKS",
@@ -24,6 +27,7 @@ __all__ = [
     "asymmetry",
     "effort_numbers",
     "foot_contacts",
+    "gait_numbers",
     "leg_numbers",
     "mean_effort",
     "mean_speed",
@@ -39,7 +43,9 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
     __getattr__ = lazy_names(
         __name__,
         {
+            "ANGLES": "likeness",
             "HUMAN_LIKE": "criteria",
+            "MOMENTS": "likeness",
             "MOMENT_CURVES": "metrics",
             "NO_FALLS": "criteria",
             "WALKS": "criteria",
@@ -49,6 +55,7 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
             "add_episode": "tally",
             "asymmetry": "per_leg",
             "foot_contacts": "series",
+            "gait_numbers": "likeness",
             "leg_numbers": "per_leg",
             "effort_numbers": "effort",
             "mean_effort": "effort",

@@ -24,6 +24,7 @@ from ..recording.open_loop import feedback
 from ..recording.recording import REWARD, TICK, Recording
 from .curves import StrideCurves
 from .effort import cost_of_transport, effort_numbers
+from .likeness import angle_numbers, force_numbers, moment_numbers
 from .per_leg import ANGLE_COLUMNS, USUAL_TOE_OFF, asymmetry, feet_differ, kinds_of, leg_numbers
 from .tally import StrideTally, tally_strides
 
@@ -75,42 +76,12 @@ def _metrics(recording: Recording, tally: StrideTally) -> dict[str, Any]:
     settings = recording.settings
     both = tally.both
     human = reference_gait(settings)
-    phase = PERCENT / 100
     reasons = Counter(str(reason) for reason in recording.fall_reason if reason)
-    features = score.force_features(both.mean("grf_vertical_bw"), both.mean("grf_forward_bw"))
+    forces = force_numbers(both.mean("grf_vertical_bw"), both.mean("grf_forward_bw"), human)
     toe_off = _mean(tally.toe_off)
     plan_x, plan_z = recording.plan_com.T
     com_z = tally.com.mean("z")
     legs = leg_numbers(tally) if feet_differ(settings) else None
-
-    def joint(name: str) -> dict[str, Any]:
-        """Return the entry of a joint in `joints`: the likeness of its angle to people's."""
-        curve = both.mean(ANGLE_COLUMNS[name])
-        people = np.degrees(human.mean(name, phase))
-        return {
-            "rmse_deg": score.rmse(curve, people),
-            "r": score.correlation(curve, people),
-            "within_1sd_percent": score.share_within_sd(curve, people, np.degrees(human.sd(name, phase))),
-        }
-
-    def moment(name: str) -> dict[str, Any]:
-        """Return the entry of a joint in `moments`: peaks, and likeness to people's; people's toe moment is unknown."""
-        curve = both.mean(MOMENT_CURVES[name])
-        peak, percent = score.largest(curve)
-        late_swing, _ = score.largest(curve[LATE_SWING_PERCENT:])
-        entry = {"peak_Nm_kg": peak, "peak_percent": percent, "late_swing_peak_Nm_kg": late_swing}
-        if name == "toe":
-            return entry | {"r": None, "within_2sd_percent": None}
-        people = human.mean(f"{name}_moment", phase)
-        sd = human.sd(f"{name}_moment", phase)
-        return entry | {
-            "r": score.correlation(curve, people),
-            "within_2sd_percent": score.share_within_sd(curve, people, 2 * sd),
-        }
-
-    def force_r(name: str) -> float | None:
-        """Return the correlation of a force's mean curve with people's."""
-        return score.correlation(both.mean(f"{name}_bw"), human.mean(name, phase))
 
     def stiffness(name: str) -> dict[str, Any]:
         """Return the entry of ankle or toe in `stiffness_Nm_rad`: mean K in each part of the stride, where one leg's
@@ -145,7 +116,7 @@ def _metrics(recording: Recording, tally: StrideTally) -> dict[str, Any]:
         "cadence_steps_min": 60 / float(np.mean(tally.step_time)) if tally.step_time else None,
         "double_support_s": _mean(tally.double_support),
         "toe_off_percent": toe_off,
-        "joints": {name: joint(name) for name in ANGLE_COLUMNS},
+        "joints": {name: angle_numbers(both.mean(column), human, name) for name, column in ANGLE_COLUMNS.items()},
         "com": {
             "x_rmse_m": score.rmse(tally.com.mean("x"), plan_x),
             "z_rmse_m": score.rmse(com_z, plan_z),
@@ -153,17 +124,8 @@ def _metrics(recording: Recording, tally: StrideTally) -> dict[str, Any]:
             "vx_r": score.correlation(tally.com.mean("vx"), np.gradient(plan_x)),
             "rise_m": float(np.ptp(com_z)) if tally.com.count else None,
         },
-        "grf": {
-            "vertical_peak1_bw": features.vertical_peak1,
-            "vertical_valley_bw": features.vertical_valley,
-            "vertical_peak2_bw": features.vertical_peak2,
-            "vertical_max_bw": float(max(tally.vertical_max)) if tally.vertical_max else None,
-            "vertical_r": force_r("grf_vertical"),
-            "braking_peak_bw": features.braking_peak,
-            "forward_peak_bw": features.forward_peak,
-            "forward_r": force_r("grf_forward"),
-        },
-        "moments": {name: moment(name) for name in MOMENT_CURVES},
+        "grf": forces | {"vertical_max_bw": float(max(tally.vertical_max)) if tally.vertical_max else None},
+        "moments": {name: moment_numbers(both.mean(column), human, name) for name, column in MOMENT_CURVES.items()},
         "ankle_work_J_kg": work["ankle"],
         "joint_work_J_kg": work,
         "effort": effort_numbers(tally.effort, body_of(settings)),
@@ -210,8 +172,6 @@ def _joint_work(tally: StrideTally) -> dict[str, dict[str, float | None]]:
     }
 
 
-LATE_SWING_PERCENT = 80
-"""Percent of the stride from which the hip holds the leg back before it lands."""
 SPRING_SOURCES = ("stiffness_changes", "equilibrium_changes", "spring_damping")
 """Entries of the energy ledger that put energy into a spring and take it out, besides the joint's work
 (`springfoot.envs.physics.energy`)."""

@@ -34,12 +34,11 @@ from springfoot.envs.task.reward import TERMS
 from springfoot.errors import SpringfootError
 from springfoot.files.array_file import read_arrays, write_arrays
 from springfoot.gait.people.gait_events import PERCENT
+from springfoot.gait.people.gait_events import WARM_UP as WARM_UP
 from springfoot.gait.plan.com_plan import ComPlan
 
 TICK = Biped.tick_dt
 """Time between two samples [s]."""
-WARM_UP = 3.0
-"""Beginning of each steady walk that the gait's numbers leave out [s]; a fall in it counts."""
 LONGEST_RECORDING = 100_000
 """Longest recording, all episodes together [s]; chosen: its series have some 6 GB."""
 BATCH = 32

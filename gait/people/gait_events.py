@@ -13,6 +13,8 @@ SHORTEST_CONTACT = 0.10
 """Time below which a contact is a scuff of the swinging foot [s]; chosen: people's stance takes 0.5 s and more."""
 SHORTEST_FLIGHT = 0.06
 """Time below which a gap is a bounce within stance, not swing [s]; chosen: people's swing takes 0.35 s and more."""
+WARM_UP = 3.0
+"""Beginning of each steady walk that the gait's numbers leave out [s]; a fall in it counts."""
 PERCENT = np.arange(101)
 """Percents of the stride (or step) of a curve: 0, 1, ..., 100."""
 

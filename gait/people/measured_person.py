@@ -11,13 +11,17 @@ from springfoot.files.text_table import Table
 
 from ..body.body import MASS_RANGE
 from .checks import AS_IT_IS
-from .gait_events import PERCENT
+from .gait_events import PERCENT, WARM_UP
 from .motion_files import NO_NAMES
 from .own_data import ACCEPTED, OwnGait, gait_of_percents, gait_of_walk, one_condition, percent_curves, read_files
 from .strides import LegStrides, MeasuredWalk, borne_mass, strides_of_legs
 
 MASSES_APART = 1.1
 """Largest factor between the given mass and the one that the forces bear that is not told; chosen."""
+LONGEST_SKIP = 1e4
+"""Longest start of a walk that may be left out [s]; chosen."""
+LONG_WALK = 10.0
+"""Time from which a walk may begin as simulations do, from a state that is not yet its gait [s]; chosen."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -48,19 +52,25 @@ def read_person(
     side: str = "both",
     mass: float | None = None,
     speed: float | None = None,
+    skip: float | None = 0.0,
     trust_units: bool = False,
     columns: Mapping[str, str] = NO_NAMES,
 ) -> MeasuredPerson:
-    """Return one person's walk from its files; `speed` [m/s] goes before that of the files, the rest as of `read_gait`.
+    """Return one person's walk from its files.
+
+    `speed` [m/s] goes before that of the files. Of a walk over time the first `skip` seconds are left out; None leaves
+    out `WARM_UP` of a walk that lasts `LONG_WALK`. The rest is as of `read_gait`.
 
     Legs with too few strides for a spread have all of theirs. Raises `SpringfootError` as `read_gait` does, for forces
-    that bear nobody's mass, and for a toe's moment larger than the ankle's.
+    that bear nobody's mass, for a toe's moment larger than the ankle's, and for a `skip` that leaves nothing.
     """
     if mass is not None:
         require_within("mass", mass, MASS_RANGE, "kg")
     if speed is not None:
         low, high, unit = ACCEPTED["speed"]
         require_within("speed", speed, (low, high), unit)
+    if skip is not None:
+        require_within("skip", skip, (0.0, LONGEST_SKIP), "s")
     read = read_files(paths, columns)
     notes: list[str] = []
     if isinstance(read, Table):
@@ -80,6 +90,11 @@ def read_person(
         borne = None
     else:
         walk: MeasuredWalk = read if speed is None else replace(read, speed=speed)
+        if skip is None:
+            skip = WARM_UP if walk.last - walk.first >= LONG_WALK else 0.0
+        if skip:
+            walk = walk.without_start(skip)
+            notes.append(f"Left out: the first {skip:g} s.")
         borne = borne_mass(walk, side)
         if mass is None and borne is not None:
             low, high = MASS_RANGE

@@ -1,6 +1,6 @@
 """Cut measured walks into strides: common time, heel strikes and toe-offs, curves over percent of each stride."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -66,6 +66,14 @@ class MeasuredWalk:
     def last(self) -> float:
         """Return the time of the last sample [s]."""
         return self.first + self.tick * (min(len(c) for leg in self.legs.values() for c in leg.values()) - 1)
+
+    def without_start(self, seconds: float) -> "MeasuredWalk":
+        """Return the walk without its first seconds; raise `SpringfootError` if nothing is left of it."""
+        ticks = round(seconds / self.tick)
+        if self.first + ticks * self.tick >= self.last:
+            raise SpringfootError(f"{self.name} lasts {self.last - self.first:.2f} s, and {seconds:g} s are left out")
+        legs = {side: {curve: values[ticks:] for curve, values in leg.items()} for side, leg in self.legs.items()}
+        return replace(self, first=self.first + ticks * self.tick, legs=legs)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -185,9 +193,19 @@ def strides_of_legs(walk: MeasuredWalk, side: str = "both", mass: float | None =
 
 
 def _legs_as_read(walk: MeasuredWalk, side: str) -> dict[str, LegStrides]:
-    """Cut each leg of a walk into strides, their curves in the units of the files."""
+    """Cut each leg of a walk into strides, their curves in the units of the files.
+
+    The threshold of contact is first of about the body weight, then of that which these strides bear.
+    """
+    legs = _legs_at(walk, side, None)
+    weight = _borne_weight(legs.values())
+    return legs if weight is None else _legs_at(walk, side, weight)
+
+
+def _legs_at(walk: MeasuredWalk, side: str, weight: float | None) -> dict[str, LegStrides]:
+    """Cut each leg of a walk into strides; `weight` is the body's, in the unit of the forces, None if unknown."""
     chosen = {name: leg for name, leg in walk.legs.items() if side in ("both", name)}
-    strides = {name: _strides_of_leg(walk, name) for name in chosen}
+    strides = {name: _strides_of_leg(walk, name, weight) for name in chosen}
     if sum(map(len, strides.values())) < FEWEST_STRIDES:
         count = sum(map(len, strides.values()))
         raise SpringfootError(
@@ -203,33 +221,33 @@ def _legs_as_read(walk: MeasuredWalk, side: str) -> dict[str, LegStrides]:
     return legs
 
 
+def _borne_weight(legs: Iterable[LegStrides]) -> float | None:
+    """Return the weight that the vertical forces bear over whole strides, in their unit; None without forces."""
+    # Mean vertical force of each stride; percent 100 is percent 0 of the next stride.
+    borne = [leg.counted("grf_vertical")[:, :-1].mean(axis=1) for leg in legs if "grf_vertical" in leg.curves]
+    # Over a stride the two feet bear just the body's weight, and so one bears half of it.
+    return 2 * float(np.mean(np.concatenate(borne))) if sum(map(len, borne)) else None
+
+
 def borne_mass(walk: MeasuredWalk, side: str = "both") -> float | None:
     """Return the mass that the vertical forces bear over whole strides [kg]; None without forces in N.
 
     `side` is both, left or right.
     """
     legs = _legs_as_read(walk, side)
-    # Mean vertical force of each stride [N]; percent 100 is percent 0 of the next stride.
-    borne = [
-        leg.counted("grf_vertical")[:, :-1].mean(axis=1)
-        for side, leg in legs.items()
-        if (side, "grf_vertical") in walk.unscaled and "grf_vertical" in leg.curves
-    ]
-    if not sum(map(len, borne)):
-        return None
-    # Over a stride the two feet bear just the body's weight, and so one bears half of it.
-    return 2 * float(np.mean(np.concatenate(borne))) / GRAVITY
+    weight = _borne_weight(leg for name, leg in legs.items() if (name, "grf_vertical") in walk.unscaled)
+    return None if weight is None else weight / GRAVITY
 
 
-def _strides_of_leg(walk: MeasuredWalk, side: str) -> NDArray:
+def _strides_of_leg(walk: MeasuredWalk, side: str, weight: float | None) -> NDArray:
     """Return (S, 3) heel strike, toe-off, next heel strike [s] of one leg, by the first method that finds enough.
 
-    Methods: the vertical force, the events in the file, the leg's motion.
+    Methods: the vertical force, the events in the file, the leg's motion. `weight` as of `_legs_at`.
     """
     leg = walk.legs[side]
     candidates = []
     if "grf_vertical" in leg:
-        threshold = CONTACT_THRESHOLD_BW * _body_weight(leg["grf_vertical"])
+        threshold = CONTACT_THRESHOLD_BW * (weight or _body_weight(leg["grf_vertical"]))
         candidates.append(find_contacts(leg["grf_vertical"], walk.tick, threshold, walk.first))
     if side in walk.contacts:
         candidates.append(walk.contacts[side])

@@ -6,12 +6,11 @@
 Quasi-stiffness by phase beside people's, the person's curves, and their springs as a schedule that walks here.
 """
 
-from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cached_property, partial
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any
 
 import numpy as np
 import tyro
@@ -23,8 +22,8 @@ from springfoot.evaluation.report import schedule_csv, states_json, table_of_sta
 from springfoot.files.markdown import MISSING, table, text_of
 from springfoot.files.writing import csv_text
 from springfoot.gait import Body, HumanGait, human_gait, schedule_from_curves
-from springfoot.gait.body import REFERENCE_HEIGHT, REFERENCE_MASS, TOE_STIFFNESS
-from springfoot.gait.people import FILE_CURVES, FILTER, PERCENT, MeasuredPerson, read_person
+from springfoot.gait.body import REFERENCE_MASS, TOE_STIFFNESS
+from springfoot.gait.people import FILE_CURVES, FILTER, PERCENT, MeasuredPerson
 from springfoot.gait.springs import (
     LOWEST_STIFFNESS,
     SPRINGS,
@@ -39,12 +38,10 @@ from springfoot.gait.springs import (
     with_swing,
 )
 
-from ..base.flags import files_of
-from ..base.study import Answer, OnProgress, Study
+from ..base.motion_files import USUAL_SPEED, MotionFiles
+from ..base.study import Answer, OnProgress
 from .person_figures import draw_curves, draw_loops
 
-USUAL_SPEED = 1.2
-"""Speed of the norm where nothing tells the person's [m/s]."""
 NO_SPRING = (
     "A quasi-stiffness is a slope of this walk's own curve, moment over angle, and no property of a spring in the "
     "joint: any stiffness gives the same curve at another rest angle (docs/explanation/stiffness.md)."
@@ -78,63 +75,18 @@ class PhaseStiffness:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Person(Study):
+class Person(MotionFiles):
     """How stiff is this person? Reads the motion files of one walk, and tells ankle and toe by phase of stance.
 
     Writes the person's curves beside people's, and a schedule of stiffness that `springfoot evaluate` walks.
     """
 
-    files: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="FILE ...", help_behavior_hint="")]
-    """Motion files of one walk: CSV, OpenSim's .mot and .sto, .c3d, Visual3D's .txt; FILE:CONDITION for one of several
-    in a CSV. docs/how-to/own-data.md lists the columns."""
-    mass: float | None = None
-    """Body mass [kg]; None takes the mass that the forces bear."""
-    height: float = REFERENCE_HEIGHT
-    """Body height [m], of the norm and of the body that walks the schedule."""
-    side: Literal["left", "right", "both"] = "both"
-    """Side whose strides count for the schedule and the means."""
-    columns: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="OURS=THEIRS")] = ()
-    """Name of a column here, and its name in the files, such as knee_angle_r=KneeRight; once for each column."""
-    speed: float | None = None
-    """Walking speed [m/s]; None takes that of the files."""
-    trust_units: tyro.conf.FlagCreatePairsOff[bool] = False
-    """Take the files as they are, even if units or signs look wrong."""
     train: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
     """Print the command that trains a policy towards this person, into this folder."""
 
-    REPEATABLE: ClassVar[Collection[str]] = frozenset({"--columns"})
-
-    def check(self) -> None:
-        """Refuse a missing file, columns without two names, and a body out of range."""
-        if not self.files:
-            raise SpringfootError("give the motion files of one person, such as walk.mot forces.mot")
-        for words in self.columns:
-            ours, equals, theirs = words.partition("=")
-            if not (ours and equals and theirs):
-                raise SpringfootError(
-                    f"--columns must be OURS=THEIRS, such as knee_angle_r=KneeRight, got {words!r:.60}"
-                )
-        if len({words.partition("=")[0] for words in self.columns}) < len(self.columns):
-            raise SpringfootError("--columns names one of our columns twice")
-        Body(height=self.height)
-
     def ask(self, progress: OnProgress) -> Answer:
         """Read the files, and put the person beside people."""
-        return _Sheet(self, self._read()).answer()
-
-    def _read(self) -> MeasuredPerson:
-        """Return the person's walk."""
-        named = [files_of(words) for words in self.files]
-        condition = named[0][1] if len(named) == 1 else None
-        return read_person(
-            [file for files, _ in named for file in files],
-            condition=condition,
-            side=self.side,
-            mass=self.mass,
-            speed=self.speed,
-            trust_units=self.trust_units,
-            columns=dict(words.split("=", 1) for words in self.columns),
-        )
+        return _Sheet(self, self.read()).answer()
 
 
 class _Sheet:
@@ -387,29 +339,14 @@ class _Sheet:
 
     def _read_list(self, notes: list[str]) -> str:
         """Return the list of readings, borrowings and omissions."""
-        gait = self._measured.gait
-        counts = {side: len(leg.times) for side, leg in self._measured.legs.items() if len(leg.times)}
-        strides = ", ".join(f"{count} {side}".strip() for side, count in counts.items())
-        if not strides:
-            strides = "mean curves" if gait.strides is None else f"mean curves of {gait.strides}"
-        weighed = {side: int(leg.weighed.sum()) for side, leg in self._measured.legs.items()}
-        if any(weighed[side] < count for side, count in counts.items()):
-            strides += f" (on a force plate {', '.join(f'{weighed[side]} {side}'.strip() for side in counts)})"
-        speed = "as given" if self._asked.speed else "from the files"
         borrowed = ", ".join(name.replace("_", " ") for name in self._gait.borrowed if not name.endswith(" sd"))
+        over_time = any(len(leg.times) for leg in self._measured.legs.values())
+        without_mass = f": stiffness is per kg, the schedule of {REFERENCE_MASS:g} kg"
         lines = [
-            f"Files: {gait.name}; strides: {strides}; side: {self._asked.side}.",
-            f"Speed: {gait.speed:.2f} m/s, {speed}."
-            if gait.speed
-            else f"Speed: unknown; the norm is of {USUAL_SPEED:g} m/s. --speed gives it.",
-            f"Mass: {self._mass:.1f} kg, {self._measured.mass_from}."
-            if self._mass
-            else f"Mass: unknown: stiffness is per kg, the schedule of {REFERENCE_MASS:g} kg. --mass gives it.",
-            f"Norm: 20 adults at {self._norm.speed:.2f} m/s, {self._asked.height:g} m tall"
-            f"{', the nearest measured speed' if self._norm.clamped else ''}.",
+            *self._asked.readings(self._measured, self._norm, without_mass),
             f"Borrowed from the norm: {borrowed or 'nothing'}.",
             f"Filter: none on the curves; {FILTER}, on angles for events and joint powers."
-            if counts
+            if over_time
             else "Filter: none.",
             *notes,
         ]

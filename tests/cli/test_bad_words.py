@@ -65,7 +65,7 @@ POLICIES = (
     "or one of pretrained, medium, predicted, learned, untrained, random, constant, schedule, "
     "quasi_stiffness, thesis, thesis_printed"
 )
-COMMANDS_IN_WORDS = "train, evaluate, live, feet, person, export, study, datasets, examples and completion"
+COMMANDS_IN_WORDS = "train, evaluate, live, feet, person, score, export, study, datasets, examples and completion"
 CASES = [
     *((["evaluate", "schedule", *words], f"springfoot evaluate: error: {said}") for words, said in EVALUATE),
     *((["train", "--out", "x", *words], f"springfoot train: error: {said}") for words, said in TRAIN),

@@ -22,6 +22,7 @@ from springfoot.cli.train import TrainFlags
 from springfoot.gait import human_gait
 from springfoot.studies.feet.foot_choice import FootChoice
 from springfoot.studies.springs.person import Person
+from springfoot.studies.walks.score import Score
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
@@ -147,7 +148,7 @@ def test_every_command_that_a_document_names_is_understood(command):
         assert not words or words[0] in get_args(Shell)
     elif program[0] == "springfoot" and program[1] != "study" and words:
         flags = {"train": TrainFlags, "evaluate": EvaluateFlags, "export": ExportFlags, "live": LiveFlags}
-        flags |= {"examples": ExamplesFlags, "feet": FootChoice, "person": Person}
+        flags |= {"examples": ExamplesFlags, "feet": FootChoice, "person": Person, "score": Score}
         tyro.cli(flags[program[1]], args=words)
     else:
         assert program[0] != "springfoot" or words in ([], ["--help"], ["--all"], ["NAME"])
