@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from springfoot.command_line import end_in_order, exit_code, parse
-from springfoot.compiling import tell_of_compiling
 from springfoot.studies.base.study import Study
 
 
@@ -20,6 +19,8 @@ def run_study(study_class: type[Study], name: str, words: Sequence[str], program
 
     def run() -> int:
         """Run the study; return the exit code."""
+        from springfoot.compiling import tell_of_compiling  # numba, which help does not need
+
         end_in_order()
         tell_of_compiling()
         return study.run(name)

@@ -78,6 +78,7 @@ def test_readers_import_from_rooms_only(name, code):
             "import springfoot.cli.train, springfoot.cli.evaluate, springfoot.cli.export, springfoot.cli.live",
             {"mujoco", "numba", "torch"},
         ),
+        ("import springfoot.cli.score", {"matplotlib", "mujoco", "numba", "torch"}),
         ("from springfoot.cli.main import STUDIES, study_class; [study_class(name) for name in STUDIES]", {"torch"}),
     ],
 )
