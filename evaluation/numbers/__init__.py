@@ -7,17 +7,17 @@ from springfoot.lazy import lazy_names
 if TYPE_CHECKING:
     from .criteria import HUMAN_LIKE, NO_FALLS, WALKS, Criterion, number_text, unmet, with_derived
     from .effort import effort_numbers, mean_effort, stiffness_charge
-    from .likeness import ANGLES, MOMENTS, gait_numbers
+    from .likeness import ANGLE_JOINTS, MOMENT_JOINTS, gait_numbers
     from .metrics import MOMENT_CURVES, Gait, measure
     from .per_leg import asymmetry, leg_numbers
     from .series import foot_contacts, mean_speed, strides_within
     from .tally import StrideTally, add_episode
 
 __all__ = [
-    "ANGLES",
+    "ANGLE_JOINTS",
     "HUMAN_LIKE",
-    "MOMENTS",
     "MOMENT_CURVES",
+    "MOMENT_JOINTS",
     "NO_FALLS",
     "WALKS",
     "Criterion",
@@ -43,9 +43,9 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
     __getattr__ = lazy_names(
         __name__,
         {
-            "ANGLES": "likeness",
+            "ANGLE_JOINTS": "likeness",
             "HUMAN_LIKE": "criteria",
-            "MOMENTS": "likeness",
+            "MOMENT_JOINTS": "likeness",
             "MOMENT_CURVES": "metrics",
             "NO_FALLS": "criteria",
             "WALKS": "criteria",

@@ -12,9 +12,9 @@ from springfoot.gait import HumanGait
 from springfoot.gait.people import scores as score
 from springfoot.gait.people.gait_events import PERCENT
 
-ANGLES = ("thigh", "knee", "ankle", "toe")
+ANGLE_JOINTS = ("thigh", "knee", "ankle", "toe")
 """Joints whose angle is held against people's; the thigh's is to the vertical."""
-MOMENTS = ("hip", "knee", "ankle")
+MOMENT_JOINTS = ("hip", "knee", "ankle")
 """Joints whose moment of people is known."""
 LATE_SWING_PERCENT = 80
 """Percent of the stride from which the hip holds the leg back before it lands."""
@@ -39,7 +39,7 @@ def moment_numbers(curve: NDArray, human: HumanGait, joint: str) -> Numbers:
     peak, percent = score.largest(curve)
     late_swing, _ = score.largest(curve[LATE_SWING_PERCENT:])
     numbers: Numbers = {"peak_Nm_kg": peak, "peak_percent": percent, "late_swing_peak_Nm_kg": late_swing}
-    if joint not in MOMENTS:
+    if joint not in MOMENT_JOINTS:
         return numbers | {"r": None, "within_2sd_percent": None}
     people = human.mean(f"{joint}_moment", _PHASE)
     sd = human.sd(f"{joint}_moment", _PHASE)
@@ -70,7 +70,7 @@ def gait_numbers(curves: Mapping[str, NDArray], human: HumanGait) -> dict[str, N
     stand RMSE in people's SD and of forces, in which some publications count.
     """
     numbers: dict[str, Numbers] = {}
-    for joint in ANGLES:
+    for joint in ANGLE_JOINTS:
         if joint in curves:
             people, sd = human.mean(joint, _PHASE), human.sd(joint, _PHASE)
             numbers[joint] = angle_numbers(np.degrees(curves[joint]), human, joint)
@@ -81,7 +81,7 @@ def gait_numbers(curves: Mapping[str, NDArray], human: HumanGait) -> dict[str, N
         numbers["grf"] = force_numbers(vertical, forward, human)
         numbers["grf"]["vertical_rmse_bw"] = score.rmse(vertical, human.mean("grf_vertical", _PHASE))
         numbers["grf"]["forward_rmse_bw"] = score.rmse(forward, human.mean("grf_forward", _PHASE))
-    for joint in MOMENTS:
+    for joint in MOMENT_JOINTS:
         if f"{joint}_moment" in curves:
             numbers[f"{joint}_moment"] = moment_numbers(curves[f"{joint}_moment"], human, joint)
     return numbers

@@ -6,7 +6,6 @@
 The numbers are those of `springfoot evaluate`, by the same functions, of each leg and of both together.
 """
 
-import csv
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,8 +14,9 @@ import numpy as np
 
 from springfoot.arrays import NDArray
 from springfoot.errors import SpringfootError
-from springfoot.evaluation.numbers import ANGLES, MOMENTS, gait_numbers
+from springfoot.evaluation.numbers import ANGLE_JOINTS, MOMENT_JOINTS, gait_numbers
 from springfoot.files.markdown import MISSING, table, text_of
+from springfoot.files.text_table import read_csv
 from springfoot.files.writing import csv_text
 from springfoot.gait import HumanGait, human_gait
 from springfoot.gait.people import PERCENT, MeasuredPerson, rmse
@@ -29,7 +29,7 @@ PUBLISHED = Path("docs", "results", "csv", "published_walks.csv")
 SCORED = {
     **{
         joint: {"rmse_deg": ("RMSE, °", ".2f"), "r": ("r", ".3f"), "within_1sd_percent": ("in ±SD, %", ".0f")}
-        for joint in ANGLES
+        for joint in ANGLE_JOINTS
     },
     "grf": {
         "vertical_r": ("vertical force, r", ".3f"),
@@ -39,15 +39,15 @@ SCORED = {
         "braking_peak_bw": ("fore-aft force, braking, BW", ".2f"),
         "forward_peak_bw": ("fore-aft force, forward, BW", ".2f"),
     },
-    **{f"{joint}_moment": {"r": ("r", ".3f")} for joint in MOMENTS},
+    **{f"{joint}_moment": {"r": ("r", ".3f")} for joint in MOMENT_JOINTS},
     "ankle_moment": {"r": ("r", ".3f"), "peak_Nm_kg": ("peak, N·m/kg", ".2f")},
 }
 """Curve, as `gait_numbers` names it -> number -> its label and format in the table."""
 CURVES = {
-    **{joint: f"angle of the {joint}" for joint in ANGLES},
+    **{joint: f"angle of the {joint}" for joint in ANGLE_JOINTS},
     "grf_vertical": "vertical force",
     "grf_forward": "fore-aft force",
-    **{f"{joint}_moment": f"moment of the {joint}" for joint in MOMENTS},
+    **{f"{joint}_moment": f"moment of the {joint}" for joint in MOMENT_JOINTS},
 }
 """Curve that is scored -> its name in the list of those that are missing."""
 BESIDE = {
@@ -129,14 +129,14 @@ def peoples_numbers(human: HumanGait) -> dict[str, dict[str, float | None]]:
     numbers = gait_numbers({curve: human.mean(curve, phase) for curve in CURVES}, human)
     for curve, of_curve in numbers.items():
         of_curve |= {name: None for name in of_curve if "peak" not in name and "valley" not in name}
-        if curve in ANGLES:
+        if curve in ANGLE_JOINTS:
             of_curve["rmse_deg"] = rmse(np.degrees(human.sd(curve, phase)), np.zeros(len(phase)))
     return numbers
 
 
 def verdict(numbers: Scores, human: HumanGait) -> str:
     """Return the answer in a sentence."""
-    angles = [f"{joint} {numbers[joint]['rmse_deg']:.1f}°" for joint in ANGLES if joint in numbers]
+    angles = [f"{joint} {numbers[joint]['rmse_deg']:.1f}°" for joint in ANGLE_JOINTS if joint in numbers]
     parts = [f"{', '.join(angles)} rms from people's mean"] if angles else []
     r = numbers.get("grf", {}).get("vertical_r")
     if r is not None:
@@ -195,5 +195,5 @@ def beside(numbers: Scores, speed: float | None) -> str:
 
 def published_walks() -> list[dict[str, str]]:
     """Return the rows of `PUBLISHED`, column -> text."""
-    with (Path(__file__).resolve().parents[2] / PUBLISHED).open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
+    table_of_walks = read_csv(Path(__file__).resolve().parents[2] / PUBLISHED)
+    return [dict(zip(table_of_walks.columns, cells, strict=True)) for _, cells in table_of_walks.rows]
