@@ -40,9 +40,9 @@ ASKED_SPEEDS = (0.8, 1.0, 1.2, 1.4, 1.6)
 """Commanded speeds [m/s]."""
 WALKED_SPEEDS = (0.9, 1.1, 1.3)
 """Walked speeds at which prices are compared [m/s]."""
-NEAR = 0.05
+NOT_DEARER = 0.05
 """Share by which a price may exceed the least one and not be told apart from it; as `told_apart.GAP` of feet."""
-SPRINGS = ("ankle_N_m_rad", "toe_N_m_rad")
+BOTH_STIFFNESSES = ("ankle_N_m_rad", "toe_N_m_rad")
 """Columns of the two stiffnesses."""
 
 
@@ -78,10 +78,10 @@ class Landscape(WalkingStudy):
         kept = Kept(self.keep)
         walks = []
         for person, (ankle, toe, speed) in product(self.persons, self._cells()):
-            cell = dict(zip(SPRINGS, (ankle, toe), strict=True))
+            cell = dict(zip(BOTH_STIFFNESSES, (ankle, toe), strict=True))
             numbers = self._walk(kept, person, f"constant:{ankle:g},{toe:g}", speed, progress)
             walks.append({"person": person, **cell, "speed_m_s": speed, **numbers})
-        even = at_walked_speeds(walks, ("person", *SPRINGS), (0.9,) if self.quick else WALKED_SPEEDS)
+        even = at_walked_speeds(walks, ("person", *BOTH_STIFFNESSES), (0.9,) if self.quick else WALKED_SPEEDS)
         least = cheapest(even)
         files = {
             "walks.csv": rows_csv(walks),
@@ -127,7 +127,7 @@ class Landscape(WalkingStudy):
         ways = [
             f"The faster walk has its least {price_name} at a stiffer {joint} in {direction(least, column, price)}."
             for price, price_name in zip(TWO_PRICES, ("fibre work", "effort"), strict=True)
-            for column, joint in zip(SPRINGS, ("ankle", "toe"), strict=True)
+            for column, joint in zip(BOTH_STIFFNESSES, ("ankle", "toe"), strict=True)
         ]
         return "\n\n".join(
             [
@@ -135,7 +135,7 @@ class Landscape(WalkingStudy):
                 least_table(least),
                 f"Of {len(walks)} cells somebody falls in {falls}. {' '.join(ways)}",
                 f"{self.what_ran} of each cell. Prices are for a metre where all cells walk equally fast; in brackets "
-                f"the cells that cost at most {100 * NEAR:g} % more than the least.",
+                f"the cells that cost at most {100 * NOT_DEARER:g} % more than the least.",
             ]
         )
 
@@ -149,7 +149,7 @@ def cheapest(even: Sequence[Row]) -> list[dict[str, Any]]:
     """Return the cell of the least price of each person, walked speed and price, from rows of `at_walked_speeds`.
 
     A row has its ankle's and toe's stiffness, the price, and of both the least and the greatest stiffness of the cells
-    that cost at most `NEAR` more; None where no cell walks.
+    that cost at most `NOT_DEARER` more; None where no cell walks.
     """
     rows = []
     for price in TWO_PRICES:
@@ -157,13 +157,13 @@ def cheapest(even: Sequence[Row]) -> list[dict[str, Any]]:
             here = [row for row in even if (row["person"], row["speed_m_s"]) == (person, speed)]
             walked = [row for row in here if row[price] is not None]
             row: dict[str, Any] = {"person": person, "speed_m_s": speed, "price": price, "cells": len(walked)}
-            ends = (f"{column}_{end}" for column in SPRINGS for end in ("from", "to"))
-            row |= dict.fromkeys((*SPRINGS, "least", *ends))
+            ends = (f"{column}_{end}" for column in BOTH_STIFFNESSES for end in ("from", "to"))
+            row |= dict.fromkeys((*BOTH_STIFFNESSES, "least", *ends))
             if walked:
                 best = min(walked, key=lambda one: one[price])
-                near = [one for one in walked if one[price] <= (1.0 + NEAR) * best[price]]
+                near = [one for one in walked if one[price] <= (1.0 + NOT_DEARER) * best[price]]
                 row |= {"least": best[price]}
-                for column in SPRINGS:
+                for column in BOTH_STIFFNESSES:
                     values = [one[column] for one in near]
                     row |= {column: best[column], f"{column}_from": min(values), f"{column}_to": max(values)}
             rows.append(row)
@@ -184,7 +184,7 @@ def _cell(row: Row) -> str:
     """Return the two stiffnesses of the least price, with the ranges near it, in words."""
     if row["least"] is None:
         return MISSING
-    return ", ".join(f"{row[name]:g} ({row[f'{name}_from']:g} to {row[f'{name}_to']:g})" for name in SPRINGS)
+    return ", ".join(f"{row[name]:g} ({row[f'{name}_from']:g} to {row[f'{name}_to']:g})" for name in BOTH_STIFFNESSES)
 
 
 def direction(least: Sequence[Row], column: str, price: str) -> str:
@@ -210,8 +210,8 @@ def draw(path: Path, walks: Sequence[Row], even: Sequence[Row]) -> None:
     """Draw the mean price over persons: a row of panels for each price, one for each walked speed, with a cross on the
     cells in which somebody falls."""
     speeds = sorted({row["speed_m_s"] for row in even})
-    ankles, toes = (sorted({row[column] for row in even}) for column in SPRINGS)
-    fallen = {tuple(row[column] for column in SPRINGS) for row in walks if row["falls"]}
+    ankles, toes = (sorted({row[column] for row in even}) for column in BOTH_STIFFNESSES)
+    fallen = {tuple(row[column] for column in BOTH_STIFFNESSES) for row in walks if row["falls"]}
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(3.6 * len(speeds), 5.6), layout="constrained")
         grid = figure.subplots(len(TWO_PRICES), len(speeds), squeeze=False)
@@ -220,7 +220,9 @@ def draw(path: Path, walks: Sequence[Row], even: Sequence[Row]) -> None:
                 prices = np.full((len(toes), len(ankles)), np.nan)
                 for (row, toe), (column, ankle) in product(enumerate(toes), enumerate(ankles)):
                     here = [
-                        one[price] for one in even if (*map(one.get, SPRINGS), one["speed_m_s"]) == (ankle, toe, speed)
+                        one[price]
+                        for one in even
+                        if (*map(one.get, BOTH_STIFFNESSES), one["speed_m_s"]) == (ankle, toe, speed)
                     ]
                     if None not in here:
                         prices[row, column] = np.mean(here)

@@ -6,7 +6,7 @@ import pytest
 
 from springfoot.cli.main import study_main
 from springfoot.studies.feet.walked_speeds import TWO_PRICES
-from springfoot.studies.springs.landscape import ANKLES, NEAR, TOES, cheapest, direction, least_table
+from springfoot.studies.springs.landscape import ANKLES, NOT_DEARER, TOES, cheapest, direction, least_table
 
 FIBRE, EFFORT = TWO_PRICES
 
@@ -30,8 +30,8 @@ def bowl(best_ankle, best_toe, *, speed=1.1, person="one", missing=()):
 def test_the_cheapest_cell_is_the_one_planted_with_the_cells_near_it():
     fibre, effort = cheapest(bowl(150.0, 28.0))
     assert (fibre["ankle_N_m_rad"], fibre["toe_N_m_rad"], fibre["least"]) == (150.0, 28.0, 3.0)
-    # 3 J/kg/m and NEAR of it reach as far as 75 N m/rad of the ankle alone; no other toe lies within 7.5 N m/rad.
-    assert NEAR * 3.0 * 500 == pytest.approx(75)
+    # 3 J/kg/m and NOT_DEARER of it reach as far as 75 N m/rad of the ankle alone; no other toe lies within 7.5 N m/rad.
+    assert 500 * 3.0 * NOT_DEARER == pytest.approx(75)
     assert (fibre["ankle_N_m_rad_from"], fibre["ankle_N_m_rad_to"]) == (100.0, 200.0)
     assert (fibre["toe_N_m_rad_from"], fibre["toe_N_m_rad_to"]) == (28.0, 28.0)
     assert (effort["ankle_N_m_rad"], effort["toe_N_m_rad"]) == (ANKLES[-1], TOES[-1])
