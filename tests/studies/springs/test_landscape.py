@@ -31,7 +31,7 @@ def test_the_cheapest_cell_is_the_one_planted_with_the_cells_near_it():
     fibre, effort = cheapest(bowl(150.0, 28.0))
     assert (fibre["ankle_N_m_rad"], fibre["toe_N_m_rad"], fibre["least"]) == (150.0, 28.0, 3.0)
     # 3 J/kg/m and NOT_DEARER of it reach as far as 75 N m/rad of the ankle alone; no other toe lies within 7.5 N m/rad.
-    assert 500 * 3.0 * NOT_DEARER == pytest.approx(75)
+    assert pytest.approx(75) == 500 * 3.0 * NOT_DEARER
     assert (fibre["ankle_N_m_rad_from"], fibre["ankle_N_m_rad_to"]) == (100.0, 200.0)
     assert (fibre["toe_N_m_rad_from"], fibre["toe_N_m_rad_to"]) == (28.0, 28.0)
     assert (effort["ankle_N_m_rad"], effort["toe_N_m_rad"]) == (ANKLES[-1], TOES[-1])
