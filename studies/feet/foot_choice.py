@@ -146,7 +146,10 @@ class FootChoice(WalkingStudy):
     def feet(self) -> dict[str, Any]:
         """Return name -> setting of each foot."""
         if self.spring:
-            return {f"{k:g} N·m/deg": braced_calf(self.calf or 1.0, k, self.rest_deg) for k in self.spring}
+            return {
+                f"{k:g} N·m/deg": braced_calf(1.0 if self.calf is None else self.calf, k, self.rest_deg)
+                for k in self.spring
+            }
         return named_feet(self.foot)
 
     @property
