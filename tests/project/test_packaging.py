@@ -194,8 +194,7 @@ def test_links_of_the_index_page_lead_to_the_files_of_their_version(version, com
     assert back == readme and len(links_of(page)) == len(links_of(readme)) > 10
     assert f"](https://example.org/springfoot/blob/{commit}/docs/explanation/design.md" in page
     assert (
-        f"![A walk, ground forces as arrows, stiffness as colour](https://example.org/springfoot/raw/{commit}/"
-        in page
+        f"![A walk, ground forces as arrows, stiffness as colour](https://example.org/springfoot/raw/{commit}/" in page
     )
     assert (ROOT / "docs" / "walk.gif").is_file()
 
