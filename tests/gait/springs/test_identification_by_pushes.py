@@ -31,13 +31,14 @@ def plateaus(phase):
 
 
 def walks(
-    stiffness=plateaus, *, trials=32, seconds=8.0, noise=0.0, reflex=0.0, angle_noise=0.0, push=1.0, seed=0
+    stiffness=plateaus, *, trials=32, seconds=8.0, noise=0.0, reflex=0.0, angle_noise=0.0, push=1.0, scatter=0.0, seed=0
 ) -> Any:
     """Strides thrown off their mean course: arguments of `identify_pushed` except bounds; one state, the body's speed.
 
     The joint is a spring of `stiffness` (phase -> K) whose rest angle moves with the angle, as a gait's does, plus
-    `reflex` [N m s/m] times the body's deviation of speed. Noise [N m] on the torque lasts for 50 ms, and one offset
-    of the same size for each trial.
+    `reflex` [N m s/m] times the body's deviation of speed. Each trial has a K of its own, with a relative standard
+    deviation of `scatter`, and angles by that much nearer to the rest angle. Noise [N m] on the torque lasts for 50 ms,
+    and one offset of the same size for each trial.
     """
     random = np.random.default_rng(seed)
     time = TICK * np.arange(round(seconds / TICK))
@@ -54,8 +55,9 @@ def walks(
     course = 0.2 * np.sin(2 * np.pi * phase) + 0.05 * np.sin(6 * np.pi * phase)
     climb = (0.4 * np.pi * np.cos(2 * np.pi * phase) + 0.3 * np.pi * np.cos(6 * np.pi * phase)) / STRIDE
     rest = 1.7 * course - 0.05 * np.cos(4 * np.pi * phase)  # K of the loop angle-torque is not the spring's
-    angle, velocity = course + moved, climb + rate
-    torque = stiffness(phase) * (rest - angle - BETA * velocity) + reflex * speed
+    own = scatter * random.standard_normal((trials, 1)) if scatter else 0.0
+    angle, velocity = course + moved + own * (rest - course), climb + rate
+    torque = stiffness(phase) * (1 + own) * (rest - angle - BETA * velocity) + reflex * speed
     if noise:
         kept = np.exp(-TICK / 0.05)
         errors = lfilter([np.sqrt(1 - kept**2)], [1, -kept], random.standard_normal(shape))
@@ -93,6 +95,14 @@ def test_a_ramp_needs_knots_and_a_constant_that_is_fitted_to_it_leaks():
     assert known(bent)[0].value == pytest.approx(300, rel=0.005)
     assert known(bent)[1].value == pytest.approx(BETA, rel=0.02)
     assert bent.explained > 0.999 > 0.99 > flat.explained
+
+
+def test_a_stiffness_that_differs_from_trial_to_trial_does_not_bias_its_mean():
+    for seed in range(5):
+        found = identify_pushed(**walks(scatter=0.03, noise=1.0, seed=seed), bounds=BOUNDS)
+        for spring, true in zip(found, PLANTED, strict=True):
+            assert known(spring)[0].value == pytest.approx(true, rel=0.05)
+            assert spring.verdict == SPRING
 
 
 def test_the_mean_course_moves_on_within_a_bin_and_so_does_its_straight_line():

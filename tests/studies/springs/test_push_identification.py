@@ -64,6 +64,21 @@ def test_noise_on_the_torque_leaves_the_truth_within_intervals_and_the_undisturb
     assert stance.applied[0] - blind.value > 5 * (blind.high - blind.value)  # and its interval knows nothing of it
 
 
+def test_a_stiffness_scattered_between_trials_is_found_by_each_trials_own_course():
+    policy, settings = prepare_pushed("schedule", PUSHES | {"episode_seconds": 8.0})
+    factors = 1.0 + 0.03 * np.random.default_rng(0).standard_normal((32, 2))  # of ankle and toe in each episode
+    ranges = np.array([settings.ankle_stiffness_range, settings.toe_stiffness_range])
+    shift = 2.0 * np.log(factors) / np.log(ranges[:, 1] / ranges[:, 0])  # actions are on a log scale
+
+    def scattered(observation):
+        return np.clip(policy(observation) + np.tile(shift, (1, 2)), -1.0, 1.0)
+
+    for row in loaded(identified(samples(record(scattered, settings, name="scattered", episodes=32)))):
+        assert row.pushed.stiffness
+        assert row.pushed.stiffness.value == pytest.approx(row.applied[0], rel=0.05)
+        assert row.pushed.verdict == SPRING
+
+
 def test_the_pretrained_policy_reacts_in_every_loaded_phase():
     rows = loaded(identified(samples(pushed("pretrained"), 1.0)))
     assert len(rows) >= 8 and {row.pushed.verdict for row in rows} == {REACTS}
