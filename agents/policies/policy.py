@@ -16,7 +16,7 @@ import numpy as np
 
 from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.batch.learned_person import POLICY_ENTRIES, person_file
-from springfoot.envs.settings.settings import BipedSettings, settings_from, settings_to_json, with_fewest_bodies
+from springfoot.envs.settings.settings import BipedSettings, settings_from, settings_to_json, with_bodies_of_model
 from springfoot.envs.task.mirror import Mirror, mirror_of
 from springfoot.errors import SpringfootError, perhaps, quoted
 from springfoot.files.tensor_file import read_tensors, write_tensors
@@ -235,7 +235,7 @@ def read_policy(name: str | Path) -> Policy:
         sizes = list(network["layer_sizes"])
         stored = dict(header["fingerprint"])
         settings = settings_from(**values)
-        biped = Biped(with_fewest_bodies(settings), 1)
+        biped = Biped(with_bodies_of_model(settings), 1)
     except (KeyError, TypeError, ValueError, OverflowError) as error:  # the last: an integer too large for a float
         fault = f"has no {error}" if isinstance(error, KeyError) else f"is not valid: {error}"
         raise SpringfootError(f"{name}: its header {fault}") from None

@@ -388,13 +388,13 @@ def body_of(settings: BipedSettings) -> Body:
     return Body(settings.height, settings.mass, settings.leg_ratio, settings.foot_ratio, settings.carried_ratio)
 
 
-def with_fewest_bodies(settings: BipedSettings) -> BipedSettings:
-    """Return the settings without drawn bodies that leave model and reference of the first one alone: all but the first
-    and, as it adds a part to the model, one with a load."""
+def with_bodies_of_model(settings: BipedSettings) -> BipedSettings:
+    """Return the settings with only the drawn bodies on which the compiled model depends: the first, and the first with
+    a load, which adds a part to the model."""
     bodies = settings.drawn_bodies
     if bodies is None:
         return settings
-    loaded = [body for body in bodies[1:] if body.carried_ratio]
+    loaded = [] if bodies[0].carried_ratio else [body for body in bodies[1:] if body.carried_ratio]
     return replace(settings, drawn_bodies=(bodies[0], *loaded[:1]))
 
 

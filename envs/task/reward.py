@@ -94,8 +94,11 @@ def _near_zmp(scale, control, targets, m, forces, i):
 
 @part
 def _pose_error(scale, pitch, angle, target):
-    """Return the weighted squared distance [rad^2] of a leg's `angle` (4,) [rad] under a trunk at `pitch` [rad] from
-    `target`."""
+    """Return the weighted squared distance [rad^2] between the joint angles of a leg and the target's pose.
+
+    `angle` (4,) [rad] begins with the hip, `target.pose` with the thigh to the vertical: the hip less the trunk's
+    `pitch` [rad].
+    """
     error = 0.0
     for joint in range(4):
         lean = pitch if joint == HIP else 0.0  # thigh to the vertical = hip - pitch
@@ -105,7 +108,11 @@ def _pose_error(scale, pitch, angle, target):
 
 @part
 def _force_distance(scale, forces, i, side, target):
-    """Return the body weights by which one foot's forces in the windows of a step leave the target's range."""
+    """Return how far one foot's mean force in a step is outside the target's range, forward and up added, and
+    `EXCESS_SHARE` of the mean vertical force beyond `MAX_FORCE` [body weights].
+
+    `forces` (W, N, side, contact, 2) [N], forward and up, are those of the step's windows; the body is number `i`.
+    """
     count = len(forces)
     forward = up = excess = 0.0
     for window in range(count):

@@ -50,7 +50,10 @@ def moment_numbers(curve: NDArray, human: HumanGait, joint: str) -> Numbers:
 
 
 def force_numbers(vertical: NDArray, forward: NDArray, human: HumanGait) -> Numbers:
-    """Return peaks of one foot's force [BW], and its likeness to people's; NaN stands for a force that is missing."""
+    """Return peaks of one foot's force [BW], and its likeness to people's.
+
+    A force that is missing is a curve of NaN, and its numbers are None.
+    """
     features = score.force_features(vertical, forward)
     return {
         "vertical_peak1_bw": features.vertical_peak1,

@@ -170,7 +170,7 @@ def closed_form(zmp: PPoly, step_length: float, height: float, slope: float = 0.
     p + p''/w^2 + p''''/w^4 + ... + height tan a, w^2 = g cos a / height, solves x'' = w^2 (x - p) - g sin a; one
     exponential that fades and one that grows in each piece make x and x' continuous, from step to step too.
     """
-    back, down = -gravity(slope)
+    back, down = -gravity(slope)  # g sin a along the slope, g cos a across it
     rate = sqrt(down / height)
     coefficients = np.array(zmp.c, float)
     for order in range(2, len(coefficients), 2):
@@ -186,17 +186,18 @@ def closed_form(zmp: PPoly, step_length: float, height: float, slope: float = 0.
     velocity = polynomial.derivative().c
     jump = np.roll(coefficients[-1], -1) - np.polyval(coefficients, durations)
     jump[-1] += step_length
-    kick = (np.roll(velocity[-1], -1) - np.polyval(velocity, durations)) / rate
-    # The sum of both jumps involves the growing exponentials alone, the difference the fading exponentials: one linear
-    # system each, over all pieces, the last one followed by the first.
+    rate_jump = (np.roll(velocity[-1], -1) - np.polyval(velocity, durations)) / rate
+    # In x' / rate a growing exponential counts as in x, a fading one with the opposite sign. So the sum of both jumps
+    # is twice that of the growing ones, the difference twice that of the fading ones: one linear system each, over
+    # all pieces, the last one followed by the first.
     decay = np.exp(-rate * durations)
     this_piece = np.eye(len(durations))
     next_piece = np.roll(this_piece, 1, axis=1)
     return HyperbolicPath(
         polynomial=polynomial,
         rate=rate,
-        fading=np.linalg.solve(this_piece * decay - next_piece, (jump - kick) / 2),
-        growing=np.linalg.solve(this_piece - next_piece * decay, (jump + kick) / 2),
+        fading=np.linalg.solve(this_piece * decay - next_piece, (jump - rate_jump) / 2),
+        growing=np.linalg.solve(this_piece - next_piece * decay, (jump + rate_jump) / 2),
     )
 
 

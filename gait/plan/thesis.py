@@ -14,10 +14,11 @@ Faults, and the methods that have them:
  Time axis      divides by 0.75 s, which it calls a cycle; the stride lasts 1.0 s (`normalised_time`).
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import cos, pi, sin
-from typing import Literal, get_args
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -63,6 +64,15 @@ def table_1(body: Body | None = None) -> dict[str, float]:
         "l_shank": body.shank_length,
         "l_thigh": body.thigh_length,
     }
+
+
+class _Course(NamedTuple):
+    """A course along x as functions of time [s]."""
+
+    position: Callable[[Any], Any]
+    """[m]."""
+    acceleration: Callable[[Any], Any]
+    """[m/s^2]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -183,7 +193,7 @@ class ThesisWalk:
     def com(self, time: ArrayLike) -> tuple[NDArray, NDArray]:
         """Return Figure 6: CoM (x, z) [m]; passes its knots but for the least-squares cubic (by up to 46 mm)."""
         time = self._within(time)
-        return self._com_x[0](time), self.com_height(time)
+        return self._com_forward.position(time), self.com_height(time)
 
     def com_acceleration(self, time: ArrayLike) -> tuple[NDArray, NDArray]:
         """Return the acceleration of the CoM, xtt and ztt [m/s^2].
@@ -191,7 +201,7 @@ class ThesisWalk:
         Fault: the thesis calls the vertical one too small to matter in 2.2, and uses it in the appendix.
         """
         time = self._within(time)
-        return self._com_x[1](time), self.com_height(time, 2)
+        return self._com_forward.acceleration(time), self.com_height(time, 2)
 
     def ankle(self, time: ArrayLike) -> tuple[NDArray, NDArray]:
         """Return Figure 7: ankle (x, z) [m], a not-a-knot cubic spline. Fault: sinks by 6 mm in stance."""
@@ -270,24 +280,28 @@ class ThesisWalk:
         return x - self.zmp(time), z
 
     @cached_property
-    def _com_x(self):
-        """Functions of time [s] for the CoM's forward position [m] and acceleration [m/s^2], by `interpolation`."""
+    def _com_forward(self) -> _Course:
+        """The CoM's forward course, by `interpolation`."""
         t = self.knot_times
         x, _ = self.com_knots
         if self.interpolation == "not-a-knot":
             spline = CubicSpline(t, x)
-            return spline, spline.derivative(2)
+            return _Course(spline, spline.derivative(2))
         if self.interpolation == "least-squares cubic":
             cubic = Polynomial.fit(t, x, 3)
-            return cubic, cubic.deriv(2)
+            return _Course(cubic, cubic.deriv(2))
         rate = 2 * pi / self.step_time
 
         def waves(t: NDArray) -> NDArray:
             return np.stack([np.sin(rate * t), np.cos(rate * t)], -1)
 
+        # Four unknowns go through six knots: the last three repeat the first three a step further on.
         line_and_waves = np.column_stack([np.ones(6), t, waves(t)])
         start, speed, *amplitudes = np.linalg.lstsq(line_and_waves, x, rcond=None)[0]
-        return lambda t: start + speed * t + waves(t) @ amplitudes, lambda t: -(rate**2) * waves(t) @ amplitudes
+        return _Course(
+            position=lambda t: start + speed * t + waves(t) @ amplitudes,
+            acceleration=lambda t: -(rate**2) * waves(t) @ amplitudes,
+        )
 
     @cached_property
     def _splines(self) -> dict[str, CubicSpline]:
@@ -296,7 +310,7 @@ class ThesisWalk:
         return {joint: CubicSpline(self.knot_times, np.stack(xz, -1)) for joint, xz in knots.items()}
 
     def _within(self, time: ArrayLike) -> NDArray:
-        """Return the times as an array; raise `SpringfootError` for times outside the step."""
+        """Return the times as an array; raise `SpringfootError` for times outside the knots, a step and a half."""
         time = np.asarray(time, float)
         ends = self.knot_times[[0, -1]]
         # Half a nanosecond: `linspace` may end a rounding error late.

@@ -223,7 +223,7 @@ class PlanTuning(Study):
                 tqdm.write(f"generation {generation + 1}: best {lines[-1][1]:.4f}, median {lines[-1][2]:.4f}")
         cost, plan, effort = self._price(body, best_vector)
         style = style_at(best_vector)
-        self._keep(style)
+        self._write_style(style)
         text = f"{json.dumps(style.to_json())}\n\npaid {cost:.4f}: {effort}"
         if plan is not None:
             human = human_gait(self.speed)
@@ -236,8 +236,9 @@ class PlanTuning(Study):
         muscle = Muscle(tissue=self.tissue, tendon=self.tendon, toe_tendon=self.toe_tendon)
         return price(body, self.speed, vector, self.weights, muscle)
 
-    def _keep(self, style: WalkStyle) -> None:
-        """Write the best style so far and this command into the file of styles; with --quick nothing."""
+    def _write_style(self, style: WalkStyle) -> None:
+        """Write the style that was found, and the command that found it, into the file of styles in place of that of
+        this speed; with --quick nothing."""
         if self.quick:
             return
         table = read_styles(self.styles)
