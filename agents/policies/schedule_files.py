@@ -5,7 +5,7 @@ describes their columns and entries. K scales with the body; a file without a bo
 """
 
 from collections.abc import Callable
-from math import radians, sqrt
+from math import sqrt
 from pathlib import Path
 from typing import Any, get_args
 
@@ -16,18 +16,15 @@ from springfoot.envs.control.phase_table import GRID
 from springfoot.envs.control.stiffness_control import FEET
 from springfoot.envs.physics.model import SIDES, damping_times
 from springfoot.envs.settings.settings import BipedSettings, Equilibrium, body_of
-from springfoot.errors import SpringfootError, as_float, require_number, require_within
-from springfoot.files.json_file import read_object
+from springfoot.errors import SpringfootError, as_float, require_number
 from springfoot.files.text_table import Table, read_csv
 from springfoot.gait.body.body import REFERENCE_HEIGHT, REFERENCE_MASS
 from springfoot.gait.people.gait_events import PERCENT
-from springfoot.gait.springs.stiffness import SPRINGS, STIFFNESS_RANGE, Segment, StiffnessSchedule
+from springfoot.gait.springs.finite_states import read_states
+from springfoot.gait.springs.stiffness import SPRINGS, STIFFNESS_RANGE, StiffnessSchedule
 
 from .baselines import PolicyFunction, follow, schedule
 
-SPRING_KEYS = ("stiffness_Nm_per_rad", "damping_time_s", "equilibrium_deg")
-"""Entries of each spring in a state."""
-STATES_FILE = "table of finite states"
 SAME_BETA = 1e-4
 """Difference of damping times that counts as rounding [s]."""
 
@@ -171,41 +168,23 @@ def _equilibrium(table: Table, stiffness: NDArray) -> dict[str, Any]:
 def _states(path: Path, settings: BipedSettings) -> StiffnessSchedule:
     """Return the schedule in a file of finite states: K and rest angle of ankle and toe, constant in each state.
 
-    K is scaled to the body of `settings`. Raises `SpringfootError` for a file of another form, for numbers out of
-    range, and for a damping time other than the model's, which no policy can set.
+    K is scaled to the body of `settings`. Raises `SpringfootError` as `read_states` does, and for a damping time other
+    than the model's, which no policy can set.
     """
-    table = read_object(path, STATES_FILE)
-    try:
-        states = table["states"]
-        height = table.get("height_m")
-        mass = table.get("mass_kg")
-        # [state][joint] -> (phase of the state's start, K, damping time, rest angle)
-        entries = [
-            [(state["phase"], *(state[joint].get(key) for key in SPRING_KEYS)) for joint in SPRINGS] for state in states
-        ]
-    except (LookupError, TypeError, AttributeError):  # an entry is missing, or a list or a number in place of an object
-        raise SpringfootError(
-            f"{path} is no {STATES_FILE}: an object with states, a list in which each has phase, ankle and "
-            f"toe, and these {', '.join(SPRING_KEYS)}"
-        ) from None
-    model_betas = damping_times(body_of(settings))[FEET]
-    scale = _scale(height, mass, settings)
+    states = read_states(path)
+    scale = _scale(states.height, states.mass, settings)
     # Times of bodies of equal proportions are as the roots of their heights (Froude).
-    time_scale = sqrt(settings.height / (REFERENCE_HEIGHT if height is None else height))
-    courses = []  # of ankle and toe: each a tuple of segments
-    for index, (joint, model_beta) in enumerate(zip(SPRINGS, model_betas, strict=True)):
-        segments = []
-        for phase, stiffness, beta, rest_deg in (state[index] for state in entries):
-            stiffness = require_number(
-                f"{path.name}: {joint} {SPRING_KEYS[0]}", stiffness, 0.0, unit="N m/rad", above=True
-            )
+    time_scale = sqrt(settings.height / (REFERENCE_HEIGHT if states.height is None else states.height))
+    for joint, betas, model_beta in zip(SPRINGS, states.damping, damping_times(body_of(settings))[FEET], strict=True):
+        for beta in betas:
             if beta is not None and not abs(as_float(beta) * time_scale - model_beta) < SAME_BETA:
                 allowed = f"{model_beta / time_scale:.4g} s, the model's"
-                raise SpringfootError(f"{path.name}: {joint} {SPRING_KEYS[1]} must be {allowed}, got {beta!r:.40}")
-            rest = radians(require_within(f"{path.name}: {joint} {SPRING_KEYS[2]}", rest_deg, (-180.0, 180.0), "deg"))
-            segments.append(Segment(phase, stiffness * scale, rest))
-        courses.append(tuple(segments))
+                raise SpringfootError(f"{path.name}: {joint} damping_time_s must be {allowed}, got {beta!r:.40}")
+    courses = (
+        [segment._replace(stiffness=segment.stiffness * scale) for segment in getattr(states.springs, joint)]
+        for joint in SPRINGS
+    )
     try:
-        return StiffnessSchedule(*courses)
-    except (SpringfootError, TypeError) as error:
+        return StiffnessSchedule(*map(tuple, courses))
+    except SpringfootError as error:  # too stiff once scaled
         raise SpringfootError(f"{path.name}: {error}") from None

@@ -1,4 +1,4 @@
-"""Read a user's foot from a file: a torque-angle table (CSV), or the settings of a foot or a schedule (JSON).
+"""Read a user's foot from a file: a torque-angle table (CSV), or the settings of a foot, or a schedule (JSON).
 
 A table has a header and the columns `ankle_deg` and `ankle_torque_Nm`, `toe_deg` and `toe_torque_Nm`, or two of them:
 dorsiflexion and toe up positive, torques with the sign of the angles, so that torque falls as the angle rises.
@@ -11,21 +11,37 @@ from springfoot.errors import SpringfootError
 from springfoot.files.json_file import read_object
 from springfoot.files.text_table import read_csv
 
-from .stiffness import SPRINGS
+from .finite_states import read_states
+from .stiffness import SPRINGS, StiffnessSchedule
 
 
 def read_foot(path: str | Path) -> dict[str, Any]:
     """Return the foot described in a file, as a value of the settings `left_foot` and `right_foot`.
 
     A CSV file is a passive foot with these torques; a joint without columns has its defaults. A JSON file is a foot's
-    dictionary, or a `StiffnessSchedule` for an adaptive foot that follows it. Raises `SpringfootError` for another
-    file; the numbers are checked when the setting is made.
+    dictionary; or for an adaptive foot that follows them, a `StiffnessSchedule` or finite states, whose K is the
+    device's as written, for any body, and whose damping times are not read: it damps as muscles do. Raises
+    `SpringfootError` for another file; the numbers of a foot are checked when the setting is made.
     """
     path = Path(path)
     if path.suffix.lower() == ".csv":
         return {"kind": "passive"} | _tables(path)
     foot = read_object(path, "foot (a JSON object, or a table in a file .csv)")
-    return {"kind": "adaptive", "schedule": foot} if set(foot) == set(SPRINGS) else foot
+    if "kind" in foot:
+        return foot
+    if "states" in foot:
+        springs = read_states(path).springs
+    elif set(foot) == set(SPRINGS):
+        try:
+            springs = StiffnessSchedule.from_json(foot)
+        except SpringfootError as error:
+            raise SpringfootError(f"{path.name}: {error}") from None
+    else:
+        raise SpringfootError(
+            f"{path.name} is no foot: it must have a 'kind', or the schedule of an adaptive foot: states, or ankle and "
+            f"toe, got {', '.join(foot) or 'nothing'}"
+        )
+    return {"kind": "adaptive", "schedule": springs.to_json()}
 
 
 def _tables(path: Path) -> dict[str, list[list[float]]]:

@@ -16,6 +16,8 @@ from springfoot.envs.control.stiffness_control import FEET
 from springfoot.envs.physics.model import ANKLE
 from springfoot.envs.settings.settings import settings_from, settings_to_json
 from springfoot.errors import SpringfootError
+from springfoot.evaluation.report.schedule_tables import states_json, table_of_states
+from springfoot.gait.body.body import Body
 from springfoot.gait.springs.foot_file import read_foot
 from springfoot.gait.springs.stiffness import StiffnessSchedule
 from springfoot.studies.base.flags import SettingsFlags, given
@@ -131,6 +133,25 @@ def test_a_csv_is_a_passive_foot_and_a_json_schedule_an_adaptive_one(tmp_path):
         assert settings_from(**json.loads(json.dumps(settings_to_json(settings)))) == settings
 
 
+def test_finite_states_of_an_evaluation_are_an_adaptive_foot_with_their_springs(tmp_path):
+    states = [
+        {"phase": 0.0, "ankle": spring(200.0, 3.0), "toe": spring(50.0, 0.0)},
+        {"phase": 0.65, "ankle": spring(40.0, -2.0), "toe": spring(8.0, 5.0)},
+    ]
+    file = tmp_path / "finite_states.json"
+    file.write_text(states_json(table_of_states("mine", Body(height=1.8, mass=80.0), 1.2, states)), encoding="utf-8")
+    foot = read_foot(file)
+    springs = settings_from(left_foot=foot).left_foot.foot.schedule
+    assert foot["kind"] == "adaptive" and springs is not None
+    stiffness, rest = springs.at(np.array([0.3, 0.9]))
+    np.testing.assert_allclose(stiffness, [[200.0, 50.0], [40.0, 8.0]])  # a device's K is that of no other body
+    np.testing.assert_allclose(np.degrees(rest), [[3.0, 0.0], [-2.0, 5.0]])
+
+
+def spring(stiffness: float, rest_deg: float) -> dict[str, float]:
+    return {"stiffness_Nm_per_rad": stiffness, "damping_time_s": 0.0206, "equilibrium_deg": rest_deg}
+
+
 def foot(**numbers: Any) -> dict[str, Any]:
     return {"kind": "passive", **numbers}
 
@@ -179,9 +200,11 @@ def test_a_wrong_table_is_refused_in_one_line(wrong, text):
         ("a.json", "[1, 2]", "is no foot (a JSON object, or a table in a file .csv): it must be an object in"),
         ("a.json", "{", "is not JSON, line 1, column 2: expecting property name enclosed in double quotes"),
         ("a.txt", "rigid", "is no foot (a JSON object, or a table in a file .csv): it is not JSON, line 1"),
-        ("a.json", '{"ankle": [], "toe": []}', "schedule: ankle segments must ascend in phase"),
+        ("a.json", '{"ankle": [], "toe": []}', "a.json: ankle segments must ascend in phase"),
+        ("a.json", '{"states": []}', "a.json: ankle segments must ascend in phase"),
+        ("a.json", '{"states": [{"phase": 0}]}', "a.json is no table of finite states: an object with states"),
         ("a.json", '{"kind": "rigid", "kind": "drop"}', "it is not JSON, 'kind' stands twice in an object"),
-        ("a.json", '{"foot": "rigid"}', "right_foot: a dictionary needs a 'kind'"),
+        ("a.json", '{"foot": "rigid"}', "a.json is no foot: it must have a 'kind', or the schedule of an"),
     ],
 )
 def test_a_wrong_file_is_one_line_exit_code_2(name, content, text, tmp_path, capsys):
