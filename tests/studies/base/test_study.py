@@ -56,6 +56,7 @@ def test_quick_takes_its_own_counts_and_says_that_figures_mean_nothing(tmp_path,
         ({"episodes": 0}, "episodes must be"),
         ({"seconds": 0.0}, "seconds must be"),
         ({"seed": -1}, "seed must be"),
+        ({"episodes": -1, "quick": True}, "episodes must be"),
     ],
 )
 def test_what_cannot_be_is_refused_before_anything_is_asked(tmp_path, flags, said):
