@@ -56,8 +56,10 @@ BESIDE = {
     "knee_deg": "knee, °",
     "ankle_deg": "ankle, °",
     "angles_deg": "angles, °",
-    "angles_sd": "angles, SD",
+    "angles_sd": "angles, SD between adults",
     "angles_r": "angles, r",
+    "all_sd": "all curves together, SD",
+    "all_r": "all curves together, r",
     "vertical_percent_bw": "vertical force, % BW",
     "forward_percent_bw": "fore-aft force, % BW",
 }
@@ -98,11 +100,13 @@ class Score(MotionFiles):
         text = [
             verdict(numbers[last], human),
             scores_table(numbers, people),
-            "People: beside RMSE the rms of their SD, beside peaks their mean's. The thigh's angle is to the vertical.",
+            "People: beside RMSE the rms of their SD between adults, beside peaks their mean's. The thigh's angle is "
+            "to the vertical.",
             "\n".join(f"- {line}" for line in lines),
             beside(numbers[last], measured.gait.speed),
-            f"RMSE, or r, to people. Each walk is held against its own people; {PUBLISHED.as_posix()} tells what each "
-            "counts, where it stands, and its licence.",
+            "RMSE, or r, to people. Each walk is held against its own people. All curves together are angles, moments "
+            f"and forces, in the SD that their source takes; {PUBLISHED.as_posix()} tells what each counts, where it "
+            "stands, and its licence.",
         ]
         return Answer(text="\n\n".join(text), files={"score.csv": scores_csv(numbers, people)})
 
@@ -187,6 +191,7 @@ def beside(numbers: Scores, speed: float | None) -> str:
         text_of(speed, ".2f"),
         *(text_of(value, ".1f") for value in (hip, knee, ankle, mean("rmse_deg"))),
         *(text_of(mean(name), ".2f") for name in ("rmse_sd", "r")),
+        *(MISSING, MISSING),  # angles, forces and moments together
         *(text_of(percent(f"{name}_rmse_bw"), ".1f") for name in ("vertical", "forward")),
     ]
     rows = [[f"{row['walk']}, {row['kind']}", *(row[name] or MISSING for name in BESIDE)] for row in published_walks()]

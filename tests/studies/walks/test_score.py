@@ -92,6 +92,7 @@ def test_each_leg_is_scored_and_what_is_missing_is_named(tmp_path, capsys):
     missing = "angle of the ankle, angle of the toe, vertical force, fore-aft force, moment of the hip"
     assert missing in told and "Mass: unknown. --mass gives it." in told
     assert "| these files (thigh for hip) | 1.30 | 2.0 | 2.0 | – | – |" in told
+    assert "angles, SD between adults" in told and "all curves together, SD" in told
 
 
 def test_one_leg_has_one_column(tmp_path):
