@@ -56,8 +56,8 @@ with legs tuned for sound feet and with legs searched for each, by people's curv
 SMALL_MEANS_NOTHING = ("toe", "knee_moment", "hip_power", "knee_power", "ankle_power", "grf_forward")
 """Curves that are small in some walks; with a rigid ankle, which its power tells, the ankle's curves too."""
 ALONE = 1.65
-"""Largest excursion of the ankle's moment over people's in a file without forces [-]; chosen. With forces the lever is
-checked instead (`LEVERS`)."""
+"""Largest excursion of the ankle's moment over people's in a file without forces, unless the user gave the mass that
+divides it [-]; chosen. With forces the lever is checked instead (`LEVERS`)."""
 ROUGHNESS = {"angle": 0.04, "moment": 0.08, "power": 0.08, "grf": 0.08}
 """Largest median of second differences from percent to percent, over the excursion, or people's if larger [-]; chosen.
 Right curves have 0.013, 0.046, 0.042 and 0.051; noise of a tenth of the excursion 0.05, of a fifth 0.09."""
@@ -110,7 +110,9 @@ Curves = Mapping[str, NDArray]
 AS_IT_IS = "if it is right, trust_units takes it as it is"
 
 
-def require_plausible(name: str, mean: Curves, people: HumanGait, sd: Curves | None = None) -> None:
+def require_plausible(
+    name: str, mean: Curves, people: HumanGait, sd: Curves | None = None, mass_given: bool = False
+) -> None:
     """Raise `SpringfootError` for mean curves (101,) that no walk has, with the likeliest cause, such as a wrong unit.
 
     Args:
@@ -118,9 +120,10 @@ def require_plausible(name: str, mean: Curves, people: HumanGait, sd: Curves | N
         mean: curve -> percent 0 to 100 of the stride, in the units of `HumanGait`.
         people: gait to compare the curves with.
         sd: spreads (101,) of some of the curves.
+        mass_given: True if moments in N m were divided by a mass that the user gave.
     """
     usual = {curve: people.mean(curve, PERCENT / 100) for curve in COLUMNS}
-    if doubt := next(_doubts(mean, usual), None):
+    if doubt := next(_doubts(mean, usual, mass_given), None):
         raise SpringfootError(f"{name}: {doubt}; {AS_IT_IS}")
     for curve, spread in (sd or {}).items():
         if not 0 <= spread.min() <= spread.max() <= MOST_SPREAD * max(np.ptp(usual[curve]), np.ptp(mean[curve])):
@@ -147,7 +150,13 @@ def require_plausible_legs(walk: MeasuredWalk, side: str, mass: float | None, pe
             _, curves = cut_strides(walk, leg, mass)
         except SpringfootError:  # too few strides
             continue
-        require_plausible(name, {curve: values.mean(axis=0) for curve, values in curves.items()}, people)
+        mean = {curve: values.mean(axis=0) for curve, values in curves.items()}
+        require_plausible(name, mean, people, mass_given=is_mass_given(walk, mass))
+
+
+def is_mass_given(walk: MeasuredWalk, mass: float | None) -> bool:
+    """Tell whether moments in N m are divided by a `mass` [kg] that the user gave."""
+    return mass is not None and any(curve == "ankle_moment" for _, curve in walk.unscaled)
 
 
 def _bears_downward(force: NDArray) -> bool:
@@ -160,7 +169,7 @@ def _bears_downward(force: NDArray) -> bool:
     return bool(-least > force.max(initial=0.0) and 0.25 < np.mean(force < 0.5 * least) < 0.9)
 
 
-def _doubts(mean: Curves, usual: Curves) -> Iterator[str]:
+def _doubts(mean: Curves, usual: Curves, mass_given: bool) -> Iterator[str]:
     """Yield texts that say why mean curves (101,) cannot be right, the surest first; `usual` are people's curves."""
     if "knee" in mean and mean["knee"].mean() > LARGEST_KNEE:
         yield (
@@ -169,7 +178,7 @@ def _doubts(mean: Curves, usual: Curves) -> Iterator[str]:
         )
     sizes = {curve: float(np.ptp(mean[curve]) / np.ptp(usual[curve])) for curve in mean}
     yield from _doubts_of_noise(mean, usual)
-    yield from _doubts_of_size(mean, sizes)
+    yield from _doubts_of_size(mean, sizes, mass_given)
     large_enough = [curve for curve in mean if sizes[curve] >= CURVE_LIMITS[curve].least]
     # Entry k is the correlation after a shift of k % of the stride: entry 0 is that of the curve as it is.
     likeness = {curve: _likeness(mean[curve], usual[curve]) for curve in large_enough}
@@ -203,7 +212,7 @@ def _doubts_of_noise(mean: Curves, usual: Curves) -> Iterator[str]:
             yield f"{COLUMNS[curve]} jumps up and down from percent to percent: noise? filter it, or take more strides"
 
 
-def _doubts_of_size(mean: Curves, sizes: Mapping[str, float]) -> Iterator[str]:
+def _doubts_of_size(mean: Curves, sizes: Mapping[str, float], mass_given: bool) -> Iterator[str]:
     """Yield a text for each curve that is too large or too small, with the mistaken unit if there is one.
 
     `sizes` are excursions over people's.
@@ -211,7 +220,7 @@ def _doubts_of_size(mean: Curves, sizes: Mapping[str, float]) -> Iterator[str]:
     for curve, size in sizes.items():
         kind = _kind(curve)
         low, high, _ = CURVE_LIMITS[curve]  # the third limit is that of the likeness
-        if curve == "ankle_moment" and "grf_vertical" not in mean:
+        if curve == "ankle_moment" and "grf_vertical" not in mean and not mass_given:
             high = ALONE
         if size > high or (size < low and not _may_be_small(curve, sizes)):
             if size == 0:

@@ -18,7 +18,7 @@ from springfoot.files.text_table import Table, read_csv
 
 from ..body.body import MASS_RANGE
 from .c3d_process import c3d_trial
-from .checks import AS_IT_IS, require_plausible, require_plausible_legs
+from .checks import AS_IT_IS, is_mass_given, require_plausible, require_plausible_legs
 from .gait_events import CONTACT_THRESHOLD_BW, PERCENT
 from .human import COLUMNS, FORCES, PEOPLE_FILE, HumanGait, fourier_series, human_gait, stance_series
 from .motion_files import (
@@ -33,7 +33,7 @@ from .motion_files import (
     our_columns,
     refuse_impossible_angles,
 )
-from .strides import MeasuredWalk, cut_strides, merge_trials
+from .strides import MeasuredWalk, cut_strides, merge_trials, require_side
 from .visual3d_file import read_visual3d
 
 ACCEPTED = {
@@ -196,15 +196,18 @@ def _require_columns(names: Iterable[str], columns: Sequence[str]) -> None:
 def percent_curves(table: Table, end: str = "") -> dict[str, Series]:
     """Return side -> curves (101,) of a table over percent: "" for curves without a side, and left, right.
 
-    `end` stands behind the names, as `_sd`. Curves on a 2 % grid are interpolated (piecewise cubic, without overshoot).
+    `end` stands behind the names, as `_sd`. Curves on a 2 % grid are interpolated: by a cubic spline, as phases of
+    stance begin at extremes, which lie between the rows; forces, which have kinks, and spreads without overshoot.
     """
     legs = {side: our_columns(table, f"_{side}{end}" if side else end) for side in ("", *FILE_SIDES)}
     if len(table.rows) != len(PERCENT):
-        from scipy.interpolate import PchipInterpolator  # half a second to import
+        from scipy.interpolate import CubicSpline, PchipInterpolator  # half a second to import
 
         coarse = np.linspace(0, 100, len(table.rows))
         for curves in legs.values():
-            curves |= {name: PchipInterpolator(coarse, values)(PERCENT) for name, values in curves.items()}
+            for name, values in curves.items():
+                through = PchipInterpolator if end or name in FORCES else CubicSpline
+                curves[name] = through(coarse, values)(PERCENT)
     return {side: curves for side, curves in legs.items() if curves}
 
 
@@ -221,6 +224,8 @@ def gait_of_percents(table: Table, side: str, trust_units: bool) -> OwnGait:
     """
     _require_side(side)
     legs = percent_curves(table)
+    if legs and "" not in legs:
+        require_side(table.name, legs, side)
     spreads = percent_curves(table, "_sd")
     chosen = FILE_SIDES if side == "both" else (side,)
     if not trust_units:
@@ -316,7 +321,8 @@ def gait_of_walk(walk: MeasuredWalk, side: str, mass: float | None, trust_units:
         mean={},  # `_with_series` puts the series here
         sd={},
     )
-    return _with_series(gait, mean, {name: values.std(axis=0, ddof=1) for name, values in curves.items()}, trust_units)
+    sd = {name: values.std(axis=0, ddof=1) for name, values in curves.items()}
+    return _with_series(gait, mean, sd, trust_units, is_mass_given(walk, mass))
 
 
 def _require_one_speed(gait: OwnGait) -> None:
@@ -336,10 +342,10 @@ def _people_at(speed: float | None) -> HumanGait:
     return human_gait(speed if speed and low <= speed <= high else COMFORTABLE_SPEED)
 
 
-def _with_series(gait: OwnGait, mean: Series, sd: Series, trust_units: bool) -> OwnGait:
+def _with_series(gait: OwnGait, mean: Series, sd: Series, trust_units: bool, mass_given: bool = False) -> OwnGait:
     """Return `gait` with series fitted to mean curves and spreads (101,); raise `SpringfootError` for implausible ones.
 
-    `trust_units` accepts curves that differ from people's.
+    `trust_units` accepts curves that differ from people's; `mass_given` as of `require_plausible`.
     """
 
     def fit(curves: Series) -> dict[str, list]:
@@ -351,7 +357,7 @@ def _with_series(gait: OwnGait, mean: Series, sd: Series, trust_units: bool) -> 
 
     refuse_impossible_angles(gait.name, mean)
     if not trust_units:
-        require_plausible(gait.name, mean, _people_at(gait.speed), sd)
+        require_plausible(gait.name, mean, _people_at(gait.speed), sd, mass_given)
         _require_one_speed(gait)
     gait = _check(gait)
     return _check(replace(gait, mean=_arrays_of("mean", fit(mean)), sd=_arrays_of("sd", fit(sd))))

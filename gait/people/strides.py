@@ -192,6 +192,14 @@ def strides_of_legs(walk: MeasuredWalk, side: str = "both", mass: float | None =
     return {name: replace(leg, curves=_scaled(leg.curves, name, walk.unscaled, mass)) for name, leg in legs.items()}
 
 
+def require_side(name: str, legs: Collection[str], side: str) -> None:
+    """Raise `SpringfootError` if the files `name` have no leg of a `side`, only `legs`; "" is one without a side."""
+    if side not in ("both", *legs):
+        only = " and ".join(f"the {leg} one" for leg in legs if leg) or "curves without a side"
+        allowed = " or ".join([*filter(None, legs), "both"])
+        raise SpringfootError(f"{name} has no {side} leg, only {only}: side must be {allowed}")
+
+
 def _legs_as_read(walk: MeasuredWalk, side: str) -> dict[str, LegStrides]:
     """Cut each leg of a walk into strides, their curves in the units of the files.
 
@@ -204,6 +212,7 @@ def _legs_as_read(walk: MeasuredWalk, side: str) -> dict[str, LegStrides]:
 
 def _legs_at(walk: MeasuredWalk, side: str, weight: float | None) -> dict[str, LegStrides]:
     """Cut each leg of a walk into strides; `weight` is the body's, in the unit of the forces, None if unknown."""
+    require_side(walk.name, walk.legs, side)
     chosen = {name: leg for name, leg in walk.legs.items() if side in ("both", name)}
     strides = {name: _strides_of_leg(walk, name, weight) for name in chosen}
     if sum(map(len, strides.values())) < FEWEST_STRIDES:
@@ -245,17 +254,9 @@ def _strides_of_leg(walk: MeasuredWalk, side: str, weight: float | None) -> NDAr
     Methods: the vertical force, the events in the file, the leg's motion. `weight` as of `_legs_at`.
     """
     leg = walk.legs[side]
-    candidates = []
-    if "grf_vertical" in leg:
-        threshold = CONTACT_THRESHOLD_BW * (weight or _body_weight(leg["grf_vertical"]))
-        candidates.append(find_contacts(leg["grf_vertical"], walk.tick, threshold, walk.first))
-    if side in walk.contacts:
-        candidates.append(walk.contacts[side])
-    thigh = leg.get("thigh", leg.get("hip"))
-    if thigh is not None and "knee" in leg:
-        candidates.append(_events_of_motion(thigh, leg["knee"], leg.get("ankle", 0 * thigh), walk.tick, walk.first))
+    candidates = (_contacts_of_force(walk, leg, weight), walk.contacts.get(side), _contacts_of_motion(walk, leg))
     best = np.empty((0, 3))
-    for contacts in candidates:
+    for contacts in filter(None, candidates):
         strides = contacts.strides(after=walk.first)
         strides = strides[strides[:, 2] <= walk.last]
         duration = strides[:, 2] - strides[:, 0]
@@ -265,6 +266,45 @@ def _strides_of_leg(walk: MeasuredWalk, side: str, weight: float | None) -> NDAr
         if len(strides) > len(best) and len(best) < FEWEST_STRIDES:
             best = strides
     return best
+
+
+def _contacts_of_force(walk: MeasuredWalk, leg: Series, weight: float | None) -> Contacts | None:
+    """Return the events of a leg by its vertical force; None without one. `weight` as of `_legs_at`."""
+    if "grf_vertical" not in leg:
+        return None
+    threshold = CONTACT_THRESHOLD_BW * (weight or _body_weight(leg["grf_vertical"]))
+    return find_contacts(leg["grf_vertical"], walk.tick, threshold, walk.first)
+
+
+def _contacts_of_motion(walk: MeasuredWalk, leg: Series) -> Contacts | None:
+    """Return the events of a leg by its motion; None without thigh, or hip, and knee."""
+    thigh = leg.get("thigh", leg.get("hip"))
+    if thigh is None or "knee" not in leg:
+        return None
+    return _events_of_motion(thigh, leg["knee"], leg.get("ankle", 0 * thigh), walk.tick, walk.first)
+
+
+def force_delay(walk: MeasuredWalk, side: str = "both") -> float | None:
+    """Return the time by which forces are later than the motion of the legs of `side` [s]; None without both.
+
+    Events by force less those by motion, the median over heel strikes or that over toe-offs, whichever is nearer to 0;
+    0 if they are of opposite signs, as on rigid feet: another clock moves both alike.
+    """
+    strikes, offs = [], []
+    for name, leg in walk.legs.items():
+        by_force, by_motion = _contacts_of_force(walk, leg, None), _contacts_of_motion(walk, leg)
+        if side in ("both", name) and by_force is not None and by_motion is not None:
+            strikes += _delays(by_force.heel_strikes, by_motion.heel_strikes)
+            offs += _delays(by_force.toe_offs, by_motion.toe_offs)
+    if not strikes or not offs:
+        return None
+    delays = (float(np.median(strikes)), float(np.median(offs)))
+    return min(delays, key=abs) if delays[0] * delays[1] > 0 else 0.0
+
+
+def _delays(times: NDArray, others: NDArray) -> list[float]:
+    """Return how much later each of `times` is than the nearest of `others` [s]; nothing without `others`."""
+    return [float(time - others[np.abs(others - time).argmin()]) for time in times] if len(others) else []
 
 
 def _events_of_motion(thigh: NDArray, knee: NDArray, ankle: NDArray, tick: float, first: float) -> Contacts:

@@ -318,7 +318,7 @@ class _Sheet:
         late = {row.side: row.slope for row in self.rows if (row.joint, row.phase.name) == ("ankle", "late rising")}
         own = [f"{slope.value:{pattern}} {side}" for side, slope in late.items() if side != "norm" and slope]
         if not own:
-            return "**No moment of an ankle was measured: the files give curves, but no stiffness.**"
+            return "**No stiffness, only curves: these files give no moment of an ankle that counts.**"
         norm = late.get("norm")
         beside = f"; people's norm is {norm.value:{pattern}}" if norm else ""
         words = " and ".join(own).replace(" both", "")

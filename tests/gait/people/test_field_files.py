@@ -7,6 +7,7 @@ from springfoot.gait import GRAVITY, SpringfootError, human_gait
 from springfoot.gait.people.human import COLUMNS, FORCES
 from springfoot.gait.people.measured_person import read_person
 from springfoot.gait.people.own_data import read_gait
+from springfoot.gait.springs import phase_slope, stance_phases
 
 MASS = 71.0
 PHASE = np.linspace(0, 1, 101)
@@ -242,6 +243,45 @@ def test_a_grid_of_two_percent_gives_the_curves_between(tmp_path):
     gait = read_gait(write(tmp_path / "grid.csv", columns, separator=",")).gait(1.3, 1.7)
     assert np.degrees(np.abs(gait.mean("knee", PHASE) - human.mean("knee", PHASE))).max() < 0.5
     assert np.abs(gait.mean("ankle_moment", PHASE) - human.mean("ankle_moment", PHASE)).max() < 0.02
+
+
+@pytest.mark.parametrize("speed", [0.9, 1.3, 1.7])
+def test_a_grid_of_two_percent_has_the_quasi_stiffness_of_a_full_one(speed, tmp_path):
+    human = human_gait(speed)
+    slopes = []
+    for percent in (np.arange(0, 101, 2), np.arange(101)):
+        columns = {"percent": percent, "toe_off_percent": np.full(len(percent), 100 * human.toe_off)}
+        columns |= {COLUMNS[name]: human.mean(name, percent / 100) for name in ("ankle", "ankle_moment")}
+        columns[COLUMNS["ankle"]] = np.degrees(columns[COLUMNS["ankle"]])
+        measured = read_person([write(tmp_path / f"{len(percent)}.csv", columns, separator=",")])
+        angle, moment = (measured.legs[""].curves[name] for name in ("ankle", "ankle_moment"))
+        phases = stance_phases("ankle", angle[0], human.toe_off)
+        slopes.append([slope.value for phase in phases if (slope := phase_slope(angle, moment, phase))])
+        assert any("controlled plantarflexion" in note for note in measured.notes) == (len(percent) == 51)
+    np.testing.assert_allclose(*slopes, rtol=0.02)
+
+
+def test_moments_alone_are_divided_by_the_mass_that_is_given(tmp_path):
+    angles, _, moments = opensim("Rajagopal", tmp_path, wrong={"_moment": 1.8})  # a strong walk, beyond people's
+    measured = read_person([angles, moments], mass=MASS)
+    peak = measured.legs["left"].curves["ankle_moment"].mean(axis=0).max()
+    assert peak == pytest.approx(1.8 * human_gait(1.3).mean("ankle_moment", PHASE).max(), rel=0.06)
+    for factor, unit in ((1e3, "N mm"), (1 / MASS, "times as far as people's")):
+        files = opensim("Rajagopal", tmp_path, wrong={"_moment": factor})
+        with pytest.raises(SpringfootError, match=unit):
+            read_person([files[0], files[2]], mass=MASS)
+
+
+@pytest.mark.parametrize("delay", [-0.1, 0.0, 0.1])
+def test_forces_of_another_clock_than_the_angles_are_told(delay, tmp_path):
+    files = opensim("Rajagopal", tmp_path)
+    lines = files[1].read_text(encoding="utf-8").splitlines()
+    begin = lines.index("endheader") + 2
+    rows = [line.split("\t", 1) for line in lines[begin:]]
+    later = [f"{float(time) + delay:.6g}\t{rest}" for time, rest in rows]
+    files[1].write_text("\n".join([*lines[:begin], *later]) + "\n", encoding="utf-8")
+    told = [note for note in read_person(files).notes if "one clock" in note]
+    assert len(told) == (delay != 0.0) and all(("later" if delay > 0 else "earlier") in note for note in told)
 
 
 def test_strides_off_the_force_plate_count_for_angles_alone(tmp_path):

@@ -137,8 +137,27 @@ def test_without_forces_events_come_from_the_angles(tmp_path):
 
 
 def test_one_leg_without_names_of_sides(tmp_path):
-    own = read_gait(our_csv(tmp_path / "mine.csv", legs=("left",)))
-    assert_like_people(own, (*ANGLES, *FORCES))
+    path = our_csv(tmp_path / "mine.csv", legs=("left",))
+    assert_like_people(read_gait(path), (*ANGLES, *FORCES))
+    with pytest.raises(
+        SpringfootError, match=r"mine.csv has no right leg, only curves without a side: side must be both"
+    ):
+        read_gait(path, side="right")
+
+
+def test_the_side_of_a_leg_that_is_missing_is_refused_by_its_name(tmp_path):
+    for percent in (True, False):
+        lines = our_csv(tmp_path / "both.csv").read_text(encoding="utf-8").splitlines()
+        table = [line.split(",") for line in lines]
+        kept = [k for k, name in enumerate(table[0]) if not name.endswith("_right")]
+        rows = [[row[k] for k in kept] for row in table]
+        if percent:
+            rows = [["percent", *rows[0][1:]], *([str(k), *row[1:]] for k, row in enumerate(rows[1:102]))]
+        (tmp_path / "left.csv").write_text("\n".join(map(",".join, rows)) + "\n", encoding="utf-8")
+        with pytest.raises(
+            SpringfootError, match=r"left.csv has no right leg, only the left one: side must be left or both"
+        ):
+            read_gait(tmp_path / "left.csv", side="right")
 
 
 def test_one_side_alone(tmp_path):
