@@ -6,7 +6,7 @@ from springfoot.lazy import lazy_names
 
 if TYPE_CHECKING:
     from .checks import LONGEST_EPISODE
-    from .feet import FOOT_SETTINGS, KINDS, SPRING_NUMBERS, foot_setting
+    from .feet import FOOT_SETTINGS, KINDS, SPRING_NUMBERS, FootSetting, foot_setting
     from .settings import (
         CONDITION_SETTINGS,
         DRAWN_SETTINGS,
@@ -32,6 +32,7 @@ __all__ = [
     "THEME_OF",
     "BipedSettings",
     "Feedforward",
+    "FootSetting",
     "Guide",
     "body_of",
     "foot_setting",
@@ -55,6 +56,7 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
             "BipedSettings": "settings",
             "Feedforward": "settings",
             "Guide": "settings",
+            "FootSetting": "feet",
             "body_of": "settings",
             "foot_setting": "feet",
             "reference_gait": "settings",

@@ -65,7 +65,10 @@ function frame(parent, title, xUnit, yUnit, xs, ys) {
 const PERCENT = Array.from({ length: 101 }, (_, k) => k);
 const followers = []; // each is told where in the stride and the step we are, and draws its cursor there
 // What is drawn of the policies in one panel: a line each, or where its feet differ one for the left leg and a finer, paler one for the right.
-const lines = which => which.flatMap((p, i) => (p.legs || [p]).map((own, leg) => ({ ...own, leg, name: [policies[i].name, ...(p.legs ? [["left", "right"][leg]] : [])].join(" "), shade: colour(i), dash: dash(i), width: leg ? 1.2 : 1.9, opacity: leg ? .6 : 1 })));
+const lines = which => which.flatMap((p, i) => (p.legs || [p]).map((own, leg) => ({ ...own, of: i, leg, name: [policies[i].name, ...(p.legs ? [["left", "right"][leg]] : [])].join(" "), shade: colour(i), dash: dash(i), width: leg ? 1.2 : 1.9, opacity: leg ? .6 : 1 })));
+// Which policy alone is shown, by its number; null for all. Whatever belongs to one has data-of.
+let only = null;
+const isShown = p => only === null || p.of === only;
 const short = value => value === null || value === undefined ? "–" : String(+value.toPrecision(3));
 function panel(parent, which) {
   const drawn = lines(which);
@@ -75,24 +78,31 @@ function panel(parent, which) {
   })).concat(which[0].zero ? [0] : []);
   const axis = which[0].axis || "stride"; // or the step, or each leg's own phase
   const { svg, X, Y } = frame(parent, which[0].title, { stride: "% of the stride", step: "% of the step", leg: "% of the leg's phase" }[axis], which[0].unit, [0, 100], all);
-  if (axis === "stride") policies.flatMap((p, i) => [[p.toe_off[0], colour(i)], ...(i ? [] : [[p.toe_off[1], "var(--people)"]])]).forEach(([at, shade]) => {
-    if (at !== null) draw(svg, "line", { x1: X(at), x2: X(at), y1: TOP, y2: HEIGHT - BOTTOM, stroke: shade, "stroke-dasharray": "2 2", class: "toe-off" });
+  if (axis === "stride") policies.flatMap((p, i) => [[p.toe_off[0], colour(i), { "data-of": i }], ...(i ? [] : [[p.toe_off[1], "var(--people)", {}]])]).forEach(([at, shade, of]) => {
+    if (at !== null) draw(svg, "line", { x1: X(at), x2: X(at), y1: TOP, y2: HEIGHT - BOTTOM, stroke: shade, "stroke-dasharray": "2 2", class: "toe-off", ...of });
   });
   const first = which.find(p => p.people) || which[0];
   if (first.people) {
     draw(svg, "path", { d: band(PERCENT, first.people, first.people_sd, X, Y), fill: "var(--people)", opacity: .25, class: "people-sd" });
     draw(svg, "path", { d: path(PERCENT, first.people, X, Y), fill: "none", stroke: "var(--people)", "stroke-width": 1.4, class: "people" });
   }
-  which.forEach(p => { if (p.plan) draw(svg, "path", { d: path(PERCENT, p.plan, X, Y), fill: "none", stroke: "var(--ink)", "stroke-width": 1.2, "stroke-dasharray": "2 3", class: "plan" }); });
+  which.forEach((p, i) => { if (p.plan) draw(svg, "path", { d: path(PERCENT, p.plan, X, Y), fill: "none", stroke: "var(--ink)", "stroke-width": 1.2, "stroke-dasharray": "2 3", class: "plan", "data-of": i }); });
   for (const p of drawn) {
-    draw(svg, "path", { d: band(PERCENT, p.mean, p.sd, X, Y), fill: p.shade, opacity: .18 * p.opacity, class: "sd" });
-    draw(svg, "path", { d: path(PERCENT, p.mean, X, Y), fill: "none", stroke: p.shade, "stroke-width": p.width, "stroke-opacity": p.opacity, "stroke-dasharray": p.dash, class: "mean" });
+    draw(svg, "path", { d: band(PERCENT, p.mean, p.sd, X, Y), fill: p.shade, opacity: .18 * p.opacity, class: "sd", "data-of": p.of });
+    draw(svg, "path", { d: path(PERCENT, p.mean, X, Y), fill: "none", stroke: p.shade, "stroke-width": p.width, "stroke-opacity": p.opacity, "stroke-dasharray": p.dash, class: "mean", "data-of": p.of });
   }
   const upright = name => draw(svg, "line", { y1: TOP, y2: HEIGHT - BOTTOM, stroke: "var(--ink)", "stroke-width": 1, class: name, visibility: "hidden" });
   const line = upright("cursor"), pointer = upright("pointer");
-  const dots = drawn.map(p => draw(svg, "circle", { r: 3.5, fill: p.shade, "fill-opacity": p.opacity, stroke: "var(--paper)", class: "dot" }));
-  const note = draw(svg, "text", { x: WIDTH - RIGHT, y: TOP - 2, "text-anchor": "end", class: "value" });
-  let following = "";
+  const dots = drawn.map(p => draw(svg, "circle", { r: 3.5, fill: p.shade, "fill-opacity": p.opacity, stroke: "var(--paper)", class: "dot", "data-of": p.of }));
+  // Values stand below the drawing, where they have lines enough, each with its policy's colour.
+  const note = make(svg.parentElement, "div", undefined, { class: "value" });
+  const tell = (begin, texts, end) => {
+    note.replaceChildren();
+    if (begin) make(note, "span", begin);
+    drawn.forEach((p, i) => { if (isShown(p)) make(note, "span", texts[i], { class: "own", style: `border-color:${p.shade}` }); });
+    if (end) make(note, "span", end);
+  };
+  let following = () => {};
   followers.push(where => {
     const at = drawn.map(p => axis !== "leg" ? where[axis] : p.leg ? where.right : where.left), k = at.map(x => Math.min(100, Math.round(x)));
     line.setAttribute("x1", X(at[0])); line.setAttribute("x2", X(at[0])); line.setAttribute("data-percent", at[0].toFixed(1)); line.setAttribute("visibility", "visible");
@@ -101,17 +111,18 @@ function panel(parent, which) {
       dot.setAttribute("visibility", y === null ? "hidden" : "visible");
       if (y !== null) { dot.setAttribute("cx", X(k[i])); dot.setAttribute("cy", Y(y)); }
     });
-    note.textContent = following = drawn.map((p, i) => short(p.mean[k[i]])).join(" / ");
+    following = () => tell("", drawn.map((p, i) => short(p.mean[k[i]])), "");
+    following();
   });
   // Where the pointer is: the values there, people's too.
   svg.addEventListener("pointermove", event => {
     const box = svg.getBoundingClientRect(), k = Math.round(((event.clientX - box.left) * WIDTH / box.width - LEFT) / (WIDTH - LEFT - RIGHT) * 100);
     if (k < 0 || k > 100) return;
     pointer.setAttribute("x1", X(k)); pointer.setAttribute("x2", X(k)); pointer.setAttribute("visibility", "visible");
-    const spread = (mean, sd) => drawn.length < 3 && sd !== null && sd !== undefined ? `${short(mean)} ± ${short(sd)}` : short(mean);
-    note.textContent = `${k} %: ${drawn.map(p => spread(p.mean[k], p.sd[k])).join(" / ")}${first.people ? ` (people ${short(first.people[k])})` : ""}`;
+    const spread = (mean, sd) => drawn.filter(isShown).length < 3 && sd !== null && sd !== undefined ? `${short(mean)} ± ${short(sd)}` : short(mean);
+    tell(`${k} %: `, drawn.map(p => spread(p.mean[k], p.sd[k])), first.people ? `people ${short(first.people[k])}` : "");
   });
-  svg.addEventListener("pointerleave", () => { pointer.setAttribute("visibility", "hidden"); note.textContent = following; });
+  svg.addEventListener("pointerleave", () => { pointer.setAttribute("visibility", "hidden"); following(); });
   const heads = ["percent", ...drawn.flatMap(p => [`${p.name} mean`, `${p.name} sd`]), ...(first.people ? ["people mean", "people sd"] : [])];
   savers(svg, which[0].title, [heads, ...PERCENT.map(k => [k, ...drawn.flatMap(p => [p.mean[k], p.sd[k]]), ...(first.people ? [first.people[k], first.people_sd[k]] : [])])]);
 }
@@ -151,8 +162,8 @@ function loop(parent, which) {
   const first = which[0];
   if (first.people_x) draw(svg, "path", { d: path(first.people_x, first.people_y, X, Y), fill: "none", stroke: "var(--people)", "stroke-width": 1.4, class: "people" });
   for (const line of first.thesis || []) draw(svg, "path", { d: path(line.map(p => p[0]), line.map(p => p[1]), X, Y), fill: "none", stroke: "var(--ink)", "stroke-width": 1.6, "stroke-dasharray": "2 3", class: "thesis" });
-  for (const p of drawn) draw(svg, "path", { d: path(p.x, p.y, X, Y), fill: "none", stroke: p.shade, "stroke-width": p.width, "stroke-opacity": p.opacity, "stroke-dasharray": p.dash, class: "mean" });
-  const dots = drawn.map(p => draw(svg, "circle", { r: 4, fill: p.shade, "fill-opacity": p.opacity, stroke: "var(--paper)", class: "dot" }));
+  for (const p of drawn) draw(svg, "path", { d: path(p.x, p.y, X, Y), fill: "none", stroke: p.shade, "stroke-width": p.width, "stroke-opacity": p.opacity, "stroke-dasharray": p.dash, class: "mean", "data-of": p.of });
+  const dots = drawn.map(p => draw(svg, "circle", { r: 4, fill: p.shade, "fill-opacity": p.opacity, stroke: "var(--paper)", class: "dot", "data-of": p.of }));
   followers.push(where => dots.forEach((dot, i) => {
     const k = Math.min(100, Math.round(where.stride)), p = drawn[i];
     dot.setAttribute("visibility", p.x[k] === null ? "hidden" : "visible");
@@ -170,8 +181,8 @@ function bars(parent, policies) {
     draw(svg, "text", { x: 4, y: 28 + row * k + 6 * policies.length }, name.replaceAll("_", " "));
     values.forEach((own, i) => {
       if (own[k] === null) return;
-      draw(svg, "rect", { x: Math.min(X(0), X(own[k])), y: 25 + row * k + 12 * i, width: Math.abs(X(own[k]) - X(0)), height: 10, fill: colour(i), class: "energy" });
-      draw(svg, "text", { x: WIDTH - 2, y: 34 + row * k + 12 * i, "text-anchor": "end" }, own[k].toFixed(3));
+      draw(svg, "rect", { x: Math.min(X(0), X(own[k])), y: 25 + row * k + 12 * i, width: Math.abs(X(own[k]) - X(0)), height: 10, fill: colour(i), class: "energy", "data-of": i });
+      draw(svg, "text", { x: WIDTH - 2, y: 34 + row * k + 12 * i, "text-anchor": "end", "data-of": i }, own[k].toFixed(3));
     });
   });
   draw(svg, "text", { x: WIDTH - 2, y: tall - 2, "text-anchor": "end", class: "unit" }, "J/kg");
@@ -187,10 +198,11 @@ const turned = ([f, u], a) => [f * Math.cos(a) - u * Math.sin(a), f * Math.sin(a
 const plus = (a, b) => [a[0] + b[0], a[1] + b[1]];
 function walker(parent, policy, i) {
   const f = policy.figure, frames = f.base.length, size = f.height / 1.7, L = f.lengths;
-  const figure = make(parent, "figure"), svg = draw(figure, "svg", { viewBox: "0 0 400 360", role: "img", "aria-label": `${policy.name}, animated` });
+  const figure = make(parent, "figure", undefined, { "data-of": i }), svg = draw(figure, "svg", { viewBox: "0 0 400 360", role: "img", "aria-label": `${policy.name}, animated` });
   const scale = 155 / size, floor = 325;
   const [left_foot, right_foot] = f.feet.map(each => each.words);
-  make(figure, "figcaption", `${policy.name}: ${left_foot === right_foot ? `both feet ${left_foot}` : `left foot ${left_foot}, right foot ${right_foot}`}`);
+  const feet = left_foot === right_foot ? `both feet ${left_foot}` : `left foot ${left_foot}, right foot ${right_foot}`;
+  make(figure, "figcaption", feet.includes(policy.name) ? feet : `${policy.name}: ${feet}`);
   const ground = draw(svg, "line", { stroke: "var(--faint)", x1: 0, x2: 400 }), marks = draw(svg, "g", {});
   const layer = draw(svg, "g", { "stroke-linecap": "round", "stroke-linejoin": "round" });
   const line = (width, shade) => draw(layer, "polyline", { fill: "none", stroke: shade, "stroke-width": width * size * scale });

@@ -4,12 +4,14 @@ Table, curves, schedules, loops, and the body. None stands for numbers that coul
 for the screen, those of metrics.json are not.
 """
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from springfoot.arrays import NDArray
 from springfoot.envs.physics.model import SIDES
+from springfoot.envs.settings.feet import FootSetting
 from springfoot.envs.settings.settings import BipedSettings, body_of, reference_gait
 from springfoot.envs.task.reward import TERMS
 from springfoot.gait import HumanGait
@@ -31,10 +33,12 @@ FORCE_PANELS = {
 """Force -> title and unit of its panel."""
 
 
-def policy_data(recording: Recording, gait: Gait) -> dict[str, Any]:
+def policy_data(
+    recording: Recording, gait: Gait, words_of: Callable[[FootSetting], str] | None = None
+) -> dict[str, Any]:
     """Return the page's data of one policy as JSON values: numbers, panels of curves, loops, two strides of the body.
 
-    The page's table and verdict come beside it (`report_page`).
+    `words_of` as of `figure_data`. The page's table and verdict come beside it (`report_page`).
     """
     human = reference_gait(recording.settings)
     by_leg = feet_differ(recording.settings)
@@ -53,7 +57,7 @@ def policy_data(recording: Recording, gait: Gait) -> dict[str, Any]:
             *_reward(gait),
         ],
         "loops": _loops(recording, gait, human, by_leg),
-        "figure": figure_data(recording),
+        "figure": figure_data(recording, words_of),
     }
 
 

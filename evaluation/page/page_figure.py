@@ -1,5 +1,6 @@
 """Collect the body of `report.html`: two strides tick by tick, as plain JSON values, and the words of its feet."""
 
+from collections.abc import Callable
 from math import radians, tan
 from pathlib import Path
 from typing import Any
@@ -33,10 +34,11 @@ def shown_numbers(values: NDArray) -> Any:
     return [float(f"{value:.{DRAWN_DIGITS}g}") if np.isfinite(value) else None for value in values.tolist()]
 
 
-def figure_data(recording: Recording) -> dict[str, Any]:
+def figure_data(recording: Recording, words_of: Callable[[FootSetting], str] | None = None) -> dict[str, Any]:
     """Return the drawing's data as JSON values: two strides of the body, tick by tick.
 
-    Joints, forces, masses and plans are in metres of the world, K in N m/rad, rest angles in degrees.
+    `words_of` puts a foot into words, `foot_words` by default. Joints, forces, masses and plans are in metres of the
+    world, K in N m/rad, rest angles in degrees.
     """
     settings = recording.settings
     body = body_of(recording.settings)
@@ -58,7 +60,7 @@ def figure_data(recording: Recording) -> dict[str, Any]:
         "strides": bool(np.isfinite(percent[0]).any()),
         "slope": slope,
         "height": body.height,
-        "feet": [_foot(settings.left_foot), _foot(settings.right_foot)],
+        "feet": [_foot(foot, words_of or foot_words) for foot in (settings.left_foot, settings.right_foot)],
         "lengths": {
             "trunk": body.trunk_length,
             "thigh": body.thigh_length,
@@ -115,13 +117,13 @@ def planned_zmp(recording: Recording, series: dict[str, NDArray]) -> NDArray:
     return series["ankle"][ticks, side, 0] + ahead
 
 
-def _foot(setting: FootSetting) -> dict[str, Any]:
+def _foot(setting: FootSetting, words_of: Callable[[FootSetting], str]) -> dict[str, Any]:
     """Return the drawing's data of a foot: its kind and numbers in words, whether it is one piece without a toe joint,
     the mechanism at ankle and toe, and whether an orthosis is on it."""
     foot = setting.foot
     joints = [_at_joint(joint) for joint in foot.joints]
     orthosis = any(joint.orthosis is not None for joint in foot.joints)
-    return {"words": foot_words(setting), "one_piece": foot.one_piece, "joints": joints, "orthosis": orthosis}
+    return {"words": words_of(setting), "one_piece": foot.one_piece, "joints": joints, "orthosis": orthosis}
 
 
 def _at_joint(joint: FootJoint) -> str:
@@ -148,13 +150,16 @@ def foot_words(setting: FootSetting) -> str:
     return f"{_plain(setting.kind)} ({', '.join(words)})" if words else _plain(setting.kind)
 
 
-def walker_words(settings: BipedSettings) -> str:
-    """Return body, feet and a learned person of the settings in words, such as "1.7 m, 63 kg, both feet intact"."""
+def walker_words(settings: BipedSettings, words_of: Callable[[FootSetting], str] | None = None) -> str:
+    """Return body, feet and a learned person of the settings in words, such as "1.7 m, 63 kg, both feet intact".
+
+    `words_of` as of `figure_data`.
+    """
     height, mass = (
         f"{bounds[0]:g} to {bounds[1]:g}" if bounds else f"{value:g}"
         for bounds, value in ((settings.height_range, settings.height), (settings.mass_range, settings.mass))
     )
-    left, right = foot_words(settings.left_foot), foot_words(settings.right_foot)
+    left, right = map(words_of or foot_words, (settings.left_foot, settings.right_foot))
     feet = f"both feet {left}" if left == right else f"left foot {left}, right foot {right}"
     person = "" if settings.person == "tuned" else f", person {printable(Path(settings.person).stem)}"
     return f"{height} m, {mass} kg, {feet}{person}"

@@ -5,12 +5,13 @@ would not draw the body.
 """
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import date
 from html import escape
 from pathlib import Path
 from typing import Any
 
+from springfoot.envs.settings.feet import FootSetting
 from springfoot.envs.settings.settings import BipedSettings, settings_from
 from springfoot.files.provenance import versions_and_commit
 
@@ -37,24 +38,30 @@ JUDGED_SPEED = 1.2
 """Commanded speed for which the criteria were chosen [m/s]."""
 
 
-def write_page(path: Path, walks: Sequence[tuple[Recording, Gait]], command: str = "") -> None:
+def write_page(
+    path: Path,
+    walks: Sequence[tuple[Recording, Gait]],
+    command: str = "",
+    words_of: Callable[[FootSetting], str] | None = None,
+) -> None:
     """Write report.html: one page of one or several evaluated policies.
 
     Args:
         path: the file.
         walks: recording and measured gait of each policy.
         command: command line that made the page, which it shows; empty for none.
+        words_of: function that puts a foot into words, `foot_words` by default.
     """
     _, first = walks[0]
     own = first.metrics["environment"]["human"] is not None
     data = {
-        "policies": [policy_data(recording, gait) for recording, gait in walks],
+        "policies": [policy_data(recording, gait, words_of) for recording, gait in walks],
         "tables": [table_rows(gait.metrics) for _, gait in walks],
         "legs": [_leg_rows(recording, gait) for recording, gait in walks],
         "norm": "own person" if own else "people",
         "made": _origin_text(walks, command),
     }
-    spoken = [spoken_verdict(gait.metrics, leg_numbers(gait.tally)) for _, gait in walks]
+    spoken = [spoken_verdict(gait.metrics, leg_numbers(gait.tally), words_of) for _, gait in walks]
     blocks = {
         "ORIGIN": f"{date.today():%-d %B %Y}. Grey: {escape(data['policies'][0]['people'])}.",
         "WHO": "\n".join(_who(index, gait.metrics, spoken[index]) for index, (_, gait) in enumerate(walks)),
@@ -98,8 +105,8 @@ def _who(index: int, metrics: dict[str, Any], spoken: Mapping[str, str]) -> str:
     colour = COLOURS[index % len(COLOURS)]
     words = f"{spoken['Walker']} {spoken['Falls']}"
     return (
-        f'<li class="name" style="border-color:{colour}"><strong>{escape(metrics["policy"])}</strong>: '
-        f"{escape(words)}</li>"
+        f'<li class="name" data-of="{index}" style="border-color:{colour}">'
+        f"<strong>{escape(metrics['policy'])}</strong>: {escape(words)}</li>"
     )
 
 
@@ -112,12 +119,16 @@ def _verdict(index: int, metrics: dict[str, Any], spoken: Mapping[str, str]) -> 
         if term not in ("Falls", "Walker")
     )
     return (
-        f'<section class="verdict" aria-label="Verdict on {escape(metrics["policy"])}">'
+        f'<section class="verdict" data-of="{index}" aria-label="Verdict on {escape(metrics["policy"])}">'
         f'<h2 class="name" style="border-color:{colour}">{escape(metrics["policy"])}</h2><dl>{items}</dl></section>'
     )
 
 
-def spoken_verdict(metrics: dict[str, Any], legs: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
+def spoken_verdict(
+    metrics: dict[str, Any],
+    legs: Mapping[str, Mapping[str, Any]],
+    words_of: Callable[[FootSetting], str] | None = None,
+) -> dict[str, str]:
     """Return the verdict in words: heading -> sentences on falls, walker, faults, speed, joints, forces and energy.
 
     At the speed for which the criteria were chosen they judge the walk. At other speeds, or with the user's own
@@ -126,6 +137,7 @@ def spoken_verdict(metrics: dict[str, Any], legs: Mapping[str, Mapping[str, Any]
     Args:
         metrics: content of metrics.json.
         legs: of `leg_numbers`.
+        words_of: as of `write_page`.
     """
     environment = metrics["environment"]
     settings = settings_from(**environment)
@@ -142,7 +154,7 @@ def spoken_verdict(metrics: dict[str, Any], legs: Mapping[str, Mapping[str, Any]
     work = metrics["joint_work_J_kg"]["ankle"]
     verdict = {
         "Falls": f"{falls_text} Mean length {metrics['seconds_mean']:.1f} s.",
-        "Walker": f"{walker_words(settings)}, {environment['speed']:g} m/s, {_followed(settings)}.",
+        "Walker": f"{walker_words(settings, words_of)}, {environment['speed']:g} m/s, {_followed(settings)}.",
     }
     if metrics["strides"]["count"] == 0:
         return verdict | {"Gait": "No complete stride after the warm-up, so nothing of the gait could be measured."}
@@ -161,7 +173,7 @@ def spoken_verdict(metrics: dict[str, Any], legs: Mapping[str, Mapping[str, Any]
         f"Fibre work {_text(metrics['effort']['fibre_J_kg_m'], '.2f')} J/kg/m, {whose}'s {people['fibre_J_kg_m']:.2f}."
     )
     energy_judged = _judged(metrics, WORKS_LIKE_PEOPLE) if judged else price
-    forces = f"Vertical peak, valley, peak {peaks} body weights, {whose}'s {people_peaks}."
+    forces = f"Mean vertical force: peak, valley, peak {peaks} body weights, {whose}'s {people_peaks}."
     return verdict | {
         "Speed": f"{_text(metrics['speed_m_s']['mean'], '.2f')} m/s, asked for {environment['speed']:.2f}.",
         "Joints": f"Off {whose}'s mean by {angles} (rms). {angles_judged}",
@@ -189,9 +201,9 @@ def _overload(legs: Mapping[str, Mapping[str, Any]], people: Mapping[str, Any], 
     largest = {side: leg["vertical_max_mean_bw"] for side, leg in legs.items()}
     over = {side: value for side, value in largest.items() if value is not None and value > OVERLOAD * usual}
     if not over:
-        return f"Neither foot bears more than a quarter above {whose}'s {usual:.2f}."
+        return f"Neither foot's largest force is more than a quarter above {whose}'s mean peak, {usual:.2f}."
     feet = " and ".join(f"the {side} foot bears {value:.2f}" for side, value in over.items())
-    return f"Overload: {feet} body weights at its peak, {whose}'s {usual:.2f}."
+    return f"Overload: {feet} body weights at the largest of a stride, {whose}'s mean peak is {usual:.2f}."
 
 
 _PEAKS = ("vertical_peak1_bw", "vertical_valley_bw", "vertical_peak2_bw")

@@ -6,7 +6,7 @@
 All persons walk the same episodes on all feet, undisturbed at two commanded speeds, and pushed.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -20,7 +20,7 @@ from matplotlib.figure import Figure
 from springfoot.agents.policies import PolicyFunction
 from springfoot.arrays import NDArray
 from springfoot.envs import BipedSettings
-from springfoot.envs.settings import body_of, settings_from
+from springfoot.envs.settings import FootSetting, body_of, settings_from
 from springfoot.errors import SpringfootError, require_number
 from springfoot.evaluation.numbers import Gait, effort_numbers, measure
 from springfoot.evaluation.page import foot_words, write_page
@@ -33,7 +33,7 @@ from ..base.study import Answer, OnProgress, WalkingStudy
 from .adapting_persons import person_and_settings
 from .foot_numbers import numbers_of
 from .orthosis import braced_calf
-from .told_apart import GAP, common_speed, difference, price_at, verdict
+from .told_apart import GAP, TOLERANCE, common_speed, difference, price_at, verdict
 from .walked_speeds import TWO_PRICES, Row, rows_csv
 
 MOST_FEET = 8
@@ -184,10 +184,13 @@ class FootChoice(WalkingStudy):
         shown = [(walk.recording, walk.gait) for walk in walks[0]]
         files = {
             "feet.csv": rows_csv(rows),
+            "prices.csv": rows_csv(self._compared(prices, speed)),
             "feet.png": partial(self._draw, names=names, prices=prices),
-            "report.html": partial(write_page, walks=shown, command=self.command),
+            "report.html": partial(write_page, walks=shown, command=self.command, words_of=self._words_of()),
         }
-        return Answer(text=self._text(names, rows, prices, speed), files=files)
+        common = any(values is not None for values in prices[TWO_PRICES[0]])
+        where = _where(self.speed, speed, walked) if common else "No walked speed is common to all feet."
+        return Answer(text=self._text(names, rows, prices, speed, where), files=files)
 
     @property
     def _other_speed(self) -> float:
@@ -204,26 +207,50 @@ class FootChoice(WalkingStudy):
         named = [replace(recording, policy=name) for recording, name in zip(recordings, self.feet, strict=True)]
         return [_Walk(recording=recording, gait=measure(recording)) for recording in named]
 
+    def _compared(self, prices: Mapping[str, Sequence[NDArray | None]], speed: float) -> list[Row]:
+        """Return a row for each foot, person and episode, with the prices at the walked `speed` [m/s] that the answer
+        compares; None on a foot without a price."""
+        return [
+            {"person": person, "foot": foot, "seed": self.seed + episode, "speed_m_s": speed}
+            | {
+                price: None if (values := of_feet[k]) is None else values[i, episode]
+                for price, of_feet in prices.items()
+            }
+            for i, person in enumerate(self.persons)
+            for k, foot in enumerate(self.feet)
+            for episode in range(self.episodes)
+        ]
+
+    def _words_of(self) -> Callable[[FootSetting], str]:
+        """Return a function that names feet for the report: springs in the user's unit."""
+        if not self.spring:
+            return foot_words
+        beside = "" if self.calf is None else f" beside a calf of {self.calf:.0%}"
+        springs = {str(settings_from(left_foot=foot).left_foot): name + beside for name, foot in self.feet.items()}
+        return lambda foot: springs.get(str(foot)) or foot_words(foot)
+
     def _text(
         self,
         names: Sequence[str],
         rows: Sequence[Row],
         prices: Mapping[str, Sequence[NDArray | None]],
         speed: float,
+        where: str,
     ) -> str:
-        """Return the report."""
+        """Return the report; `where` tells the walked `speed` [m/s] of the comparison."""
         verdicts = [verdict(words, names, prices[price]) for price, words in PRICE_NAMES.items()]
         lines = []
         for index, name in enumerate(names):
             here = [row for row in rows if row["foot"] == name]
-            fibre = prices[TWO_PRICES[0]][index]
+            of_foot = [of_price[index] for of_price in prices.values()]
+            absolute = [text_of(None if values is None else float(values.mean()), ".2f") for values in of_foot]
+            changes = [_change(of_price[index], of_price[0]) if index else MISSING for of_price in prices.values()]
             lines.append(
                 [
                     name,
                     " / ".join(_share(here, key) for key in ("falls", "falls_other_speed", "falls_pushed")),
                     _mean(here, "speed_m_s", ".2f"),
-                    text_of(None if fibre is None else float(fibre.mean()), ".2f"),
-                    *(_change(of_price[index], of_price[0]) if index else MISSING for of_price in prices.values()),
+                    *(cell for pair in zip(absolute, changes, strict=True) for cell in pair),
                     *(_mean(here, key, pattern) for key, pattern in _COLUMNS.values()),
                 ]
             )
@@ -233,12 +260,13 @@ class FootChoice(WalkingStudy):
             "walked, m/s",
             "fibre work, J/kg/m",
             "change",
-            "effort, change",
+            "effort",
+            "change",
             *_COLUMNS,
         ]
         return "\n\n".join(
             [
-                f"**{verdicts[0]}** {verdicts[1]} {WHICH_PRICE}",
+                f"**{where} {verdicts[0]}** {verdicts[1]} {WHICH_PRICE}",
                 table(head, lines),
                 self._how(names[0], speed),
                 f"What this cannot say:\n\n{CANNOT_SAY}",
@@ -256,10 +284,11 @@ class FootChoice(WalkingStudy):
             f"{self.height:g} m, {self.mass:g} kg{calf}, on {worn}, asked for {self.speed:g} m/s. "
             f"Persons: {', '.join(self.persons)}. Each walks on each foot {self.what_ran}, as much at "
             f"{self._other_speed:.3g} m/s, and as much pushed by ±{self.push_newton:g} N. Prices in this table are at "
-            f"{speed:.2f} m/s walked, the nearest speed to the asked one that all walk; feet.csv has those of the "
-            f"speed that each walks. Changes are against {first}{intervals}. Feet less than {GAP:.0%} apart are not "
-            "told apart; one that falls or does not reach the speed has no price. Push-off, of ankle and toe, is of "
-            "the side that wears the foot; peak force and moments are of the other side, the left one if both wear it."
+            f"{speed:.2f} m/s walked, the nearest speed to the asked one that all walk; prices.csv has them by "
+            f"episode, feet.csv those of the speed that each walks. Changes are against {first}{intervals}. "
+            f"Feet less than {GAP:.0%} apart are not told apart; one that falls or does not reach the speed has no "
+            "price. Push-off, of ankle and toe, is of the side that wears the foot; the largest 10 ms of force "
+            "in a stride and moments are of the other side, the left one if both wear it."
         )
 
     def _draw(self, path: Path, names: Sequence[str], prices: Mapping[str, Sequence[NDArray | None]]) -> None:
@@ -287,12 +316,26 @@ class FootChoice(WalkingStudy):
 
 _COLUMNS = {
     "push-off, J/kg": ("push_off_J_kg", ".2f"),
-    "peak, BW": ("sound_peak_bw", ".2f"),
+    "largest force, BW": ("sound_peak_bw", ".2f"),
     "hip, N·m/kg": ("hip_moment_Nm_kg", ".2f"),
     "knee, N·m/kg": ("knee_moment_Nm_kg", ".2f"),
     "step asymmetry": ("step_asymmetry", ".0%"),
 }
 """Heading -> column and format of the numbers that are told without an interval."""
+
+
+def _where(asked: float, speed: float, walked: Sequence[NDArray | None]) -> str:
+    """Return a sentence on the walked `speed` [m/s] of the comparison, and on who does not reach the one `asked` for.
+
+    `walked` as of `common_speed`.
+    """
+    # Of each foot without a fall the fastest walk of its slowest person.
+    fastest = [float(speeds.mean(-1).max(0).min()) for speeds in walked if speeds is not None]
+    short = sum(value < asked - TOLERANCE for value in fastest)
+    if not short:
+        return f"Compared at {speed:.2f} m/s walked."
+    who = "no foot reaches" if short == len(fastest) else "not every foot reaches"
+    return f"Compared at {speed:.2f} m/s walked, as {who} the asked {asked:g} m/s."
 
 
 def _change(prices: NDArray | None, first: NDArray | None) -> str:

@@ -13,10 +13,14 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from springfoot.errors import require_within
+
 from .spring_map import SpringMap
 
 PER_DEG = 180.0 / np.pi
 """N m/rad in 1 N m/deg."""
+MOST_SPRING = 1000.0 / PER_DEG
+"""Largest stiffness of an orthosis [N m/deg], that of the setting."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,6 +46,7 @@ class Orthosis(SpringMap):
 
 def braced_calf(strength: float, spring: float, rest_deg: float = 0.0) -> dict[str, Any]:
     """Return the foot below a calf of a share `strength` of a sound one's, in an orthosis of stiffness `spring`
-    [N m/deg] at rest at `rest_deg`."""
+    [N m/deg] at rest at `rest_deg`; raise `SpringfootError` for a spring out of range."""
+    require_within("spring", spring, (0.0, MOST_SPRING), "N m/deg")
     calf = {"kind": "intact"} if strength == 1.0 else {"kind": "weak", "strength": strength}
     return calf | {"orthosis": {"ankle_stiffness": round(spring * PER_DEG, 3), "ankle_deg": rest_deg}}

@@ -1,6 +1,7 @@
 """report.html in a real browser, Debian's Chromium by Playwright, from file://, as wide as a desk's and a phone's."""
 
 import csv
+from dataclasses import replace
 
 import imageio.v3 as iio
 import pytest
@@ -122,21 +123,57 @@ def test_the_first_screen_has_the_walker_its_falls_and_curves(chromium, page, tm
         tab.close()
 
 
+@pytest.fixture(scope="module")
+def feet(tmp_path_factory):
+    """A page of one walk under six names."""
+    path = tmp_path_factory.mktemp("feet") / "report.html"
+    recording, gait = walked("schedule")
+    names = [f"{stiffness} N·m/deg" for stiffness in (0, 2, 4, 6, 9, 12)]
+    walks = [(replace(recording, policy=name), gait) for name in names]
+    write_page(path, walks, words_of=lambda foot: "springs of the user's")
+    return path
+
+
+@pytest.mark.parametrize(("width", "height"), [(1280, 900), (390, 844)])
+def test_of_six_feet_one_is_shown_or_all_with_every_value(chromium, feet, width, height):
+    tab, told, _ = opened(chromium, feet, width)
+    curve = tab.locator("svg[aria-label^='Thigh angle']")
+    box = curve.bounding_box()
+    assert box["y"] + 0.9 * box["height"] < height
+    lines, values = curve.locator(".mean"), tab.locator("figure", has=curve).locator(".value .own")
+    shown = [line.is_visible() for line in lines.all()]
+    assert shown == [True, *5 * [False]] and values.count() == 1
+    tab.select_option("#shown", label="9 N·m/deg")
+    assert [line.is_visible() for line in lines.all()].index(True) == 4
+    tab.select_option("#shown", label="all")
+    assert all(line.is_visible() for line in lines.all())
+    curve.scroll_into_view_if_needed()
+    curve.hover()
+    edges = tab.locator("figure", has=curve).bounding_box()
+    boxes = [value.bounding_box() for value in values.all()]
+    assert len(boxes) == 6
+    assert all(edges["x"] <= each["x"] and each["x"] + each["width"] <= edges["x"] + edges["width"] for each in boxes)
+    assert tab.evaluate("document.documentElement.scrollWidth <= document.documentElement.clientWidth")
+    assert "both feet springs of the user's" in tab.locator("#who").inner_text() and told == []
+    tab.close()
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [1280, 390])
 def test_pointing_at_a_curve_reads_it(chromium, page, width, scheme):
     tab, told, _ = opened(chromium, page, width, color_scheme=scheme)
     panel = tab.locator("svg[aria-label^='Knee angle']")
+    value = tab.locator("figure", has=panel).locator(".value")
     panel.scroll_into_view_if_needed()
-    before = panel.locator(".value").text_content()
+    before = value.text_content()
     box = panel.bounding_box()
     left, right = (edge * box["width"] / 340 for edge in (58, 330))  # of the axis, as `frame` draws it
     panel.hover(position={"x": left + 0.72 * (right - left), "y": box["height"] / 2})
-    read = panel.locator(".value").text_content()
+    read = value.text_content()
     knee = tab.evaluate("policies[0].panels.find(p => p.title === 'Knee angle').mean[72]")
     assert read.startswith("72 %: ") and f"{knee:.3g}" in read and "people" in read
     tab.mouse.move(1, 1)
-    assert panel.locator(".value").text_content() == before and told == []
+    assert value.text_content() == before and told == []
     tab.close()
 
 

@@ -208,7 +208,7 @@ def test_a_walk_at_another_speed_is_held_against_people_at_that_speed():
     assert "criteria" not in " ".join(said.values())
     inside = gait.metrics["joints"]["knee"]["within_1sd_percent"]
     assert "Inside people's mean ± SD: thigh" in said["Joints"] and f"knee {inside:.0f} %" in said["Joints"]
-    assert "Neither foot bears more than a quarter above people's" in said["Forces"]
+    assert "Neither foot's largest force is more than a quarter above people's mean peak" in said["Forces"]
     assert f"Fibre work {gait.metrics['effort']['fibre_J_kg_m']:.2f} J/kg/m, people's" in said["Energy"]
 
 
@@ -218,7 +218,10 @@ def test_a_foot_that_bears_too_much_is_named_at_any_speed(walk):
     for speed in (1.2, 0.9):
         metrics = gait.metrics | {"environment": gait.metrics["environment"] | {"speed": speed}}
         forces = spoken_verdict(metrics, legs)["Forces"]
-        assert "Overload: the left foot bears 2.30 body weights at its peak, people's 1." in forces
+        assert (
+            "Overload: the left foot bears 2.30 body weights at the largest of a stride, people's mean peak is 1."
+            in forces
+        )
 
 
 def test_a_walk_that_only_falls_has_a_page_too(tmp_path):

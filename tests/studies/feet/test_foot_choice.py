@@ -36,6 +36,23 @@ def test_springs_have_the_numbers_of_the_study_of_orthoses(tmp_path, capsys):
     assert (tmp_path / "feet" / "feet.png").stat().st_size > 10_000
 
 
+@pytest.mark.slow
+def test_what_is_said_follows_from_prices_csv(tmp_path, capsys):
+    words = ["--height", "1.8", "--mass", "80", "--calf", "0.25", "--speed", "1.1", "--spring", "4", "6"]
+    assert main([*QUICK, *words, "--out", str(tmp_path / "feet")]) == 0
+    text = capsys.readouterr().out
+    rows = read(tmp_path / "feet" / "prices.csv")
+    (speed,) = {float(row["speed_m_s"]) for row in rows}
+    assert f"**Compared at {speed:.2f} m/s walked, as no foot reaches the asked 1.1 m/s." in text
+    (line,) = (line for line in text.splitlines() if line.startswith("| 6 N·m/deg"))
+    cells = [cell.strip() for cell in line.split("|")]
+    for column, place in (("fibre_J_kg_m", 4), ("effort", 6)):
+        of = {row["foot"]: float(row[column]) for row in rows}  # of one person and one episode
+        assert cells[place] == f"{of['6 N·m/deg']:.2f}"
+        change = round(100 * (of["6 N·m/deg"] / of["4 N·m/deg"] - 1))
+        assert cells[place + 1] == (f"{change:+d} %".replace("-", "−") if change else "0 %")
+
+
 @pytest.mark.parametrize(
     ("words", "error"),
     [
@@ -49,6 +66,8 @@ def test_springs_have_the_numbers_of_the_study_of_orthoses(tmp_path, capsys):
         (["--foot", "rigid", "--foot", "{"], "must be JSON"),
         (["--foot", "rigid", "--foot", "none.csv"], "none.csv"),
         (["--spring", "0", "2", "--calf", "2"], "strength"),
+        (["--spring", "0", "-1"], "spring must be in [0, 17.4533] N m/deg, got -1"),
+        (["--spring", "0", "2", "--quick", "--episodes", "-1"], "episodes must be"),
         (["--spring", "0", "2", "--persons", "pretrained"], "pretrained moves no person"),
         (["--spring", "0", "2", "--spring", "4"], "--spring is given twice"),
     ],
