@@ -202,7 +202,7 @@ function walker(parent, policy, i) {
   const scale = 155 / size, floor = 325;
   const [left_foot, right_foot] = f.feet.map(each => each.words);
   const feet = left_foot === right_foot ? `both feet ${left_foot}` : `left foot ${left_foot}, right foot ${right_foot}`;
-  make(figure, "figcaption", feet.includes(policy.name) ? feet : `${policy.name}: ${feet}`);
+  make(figure, "figcaption", left_foot.startsWith(`${policy.name} `) ? feet : `${policy.name}: ${feet}`);
   const ground = draw(svg, "line", { stroke: "var(--faint)", x1: 0, x2: 400 }), marks = draw(svg, "g", {});
   const layer = draw(svg, "g", { "stroke-linecap": "round", "stroke-linejoin": "round" });
   const line = (width, shade) => draw(layer, "polyline", { fill: "none", stroke: shade, "stroke-width": width * size * scale });
