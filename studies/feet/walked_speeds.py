@@ -13,40 +13,43 @@ TWO_PRICES = ("fibre_J_kg_m", "effort")
 """Columns of the two prices of a walk: fibre work, and all of the effort."""
 
 
-def at_walked_speeds(rows: Sequence[Row], keys: Sequence[str], speeds: Sequence[float]) -> list[dict[str, Any]]:
-    """Return a row for each case and each of the walked `speeds` [m/s], with `TWO_PRICES`.
+def at_walked_speeds(
+    rows: Sequence[Row], keys: Sequence[str], speeds: Sequence[float], numbers: Sequence[str] = TWO_PRICES
+) -> list[dict[str, Any]]:
+    """Return a row for each case and each of the walked `speeds` [m/s], with `numbers`, usually both prices.
 
-    Prices are linear between two neighbouring commanded speeds without a fall; None where a case has no such pair
+    Numbers are linear between two neighbouring commanded speeds without a fall; None where a case has no such pair
     around the speed: it falls, or walks at other speeds.
 
     Args:
-        rows: walks with `keys`, `TWO_PRICES`, `speed_m_s` (commanded), `walked_m_s` and `falls`.
+        rows: walks with `keys`, `numbers`, `speed_m_s` (commanded), `walked_m_s` and `falls`.
         keys: columns that tell one case from another.
         speeds: at which cases are compared.
+        numbers: columns of what is compared.
     """
     compared = []
     for speed in speeds:
         for case in dict.fromkeys(tuple(row[key] for key in keys) for row in rows):
             walks = [row for row in rows if tuple(row[key] for key in keys) == case]
             walks.sort(key=lambda row: row["speed_m_s"])
-            between = [prices for pair in pairwise(walks) if (prices := _prices_at(speed, *pair)) is not None]
+            between = [known for pair in pairwise(walks) if (known := _numbers_at(speed, *pair, numbers))]
             line: dict[str, Any] = {**dict(zip(keys, case, strict=True)), "speed_m_s": speed, "walked_m_s": speed}
-            line |= between[0] if between else dict.fromkeys(TWO_PRICES)
+            line |= between[0] if between else dict.fromkeys(numbers)
             compared.append(line)
     return compared
 
 
-def _prices_at(speed: float, slow: Row, fast: Row) -> dict[str, float] | None:
-    """Return the prices at a walked `speed` [m/s], linear between two walks; None unless it lies between them, without
+def _numbers_at(speed: float, slow: Row, fast: Row, numbers: Sequence[str]) -> dict[str, float] | None:
+    """Return the numbers at a walked `speed` [m/s], linear between two walks; None unless it lies between them, without
     falls."""
-    unmeasured = any(walk[price] is None for walk in (slow, fast) for price in TWO_PRICES)
+    unmeasured = any(walk[name] is None for walk in (slow, fast) for name in numbers)
     if slow["falls"] or fast["falls"] or unmeasured:
         return None
     low = slow["walked_m_s"]
     high = fast["walked_m_s"]
     if not low <= speed <= high:
         return None
-    return {price: float(np.interp(speed, [low, high], [slow[price], fast[price]])) for price in TWO_PRICES}
+    return {name: float(np.interp(speed, [low, high], [slow[name], fast[name]])) for name in numbers}
 
 
 def lowest(walked: Mapping[float, float]) -> tuple[float, float]:

@@ -1,0 +1,360 @@
+"""Say how each effect of docs/effects.csv is walked and measured here, or why it is not.
+
+An experiment is conditions (settings), a speed, and a function from measured numbers to the effect, for each episode.
+Energy and work are compared where all conditions walk equally fast, as on a treadmill; all else at the commanded speed.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from math import degrees
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from springfoot.arrays import NDArray
+from springfoot.envs import BipedSettings
+from springfoot.envs.physics import JOINTS
+from springfoot.envs.settings import body_of
+from springfoot.gait.body import TOE_STIFFNESS
+
+from .effect_numbers import FIBRE
+
+Measured = Mapping[Any, Mapping[str, NDArray]]
+"""Condition -> number -> its value in each of E episodes (E,), NaN where it is unknown."""
+Effect = Callable[[Measured], NDArray]
+"""Function that returns an effect in each episode (E,)."""
+SOUND = "sound"
+LOCKED = 1000.0
+"""Stiffness of a passive foot's toe that is called locked, the largest [N m/rad]."""
+_BODY = body_of(BipedSettings())
+_FEET_KG = 2.0 * (_BODY.foot_mass + _BODY.toe_mass)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Experiment:
+    """How one effect is walked and measured."""
+
+    conditions: Mapping[Any, Mapping[str, Any]]
+    """Condition -> settings that differ from the sound walk."""
+    speed: float
+    """Speed [m/s], walked or commanded."""
+    effect: Effect
+    """The effect."""
+    walked: bool = True
+    """True: all conditions are compared at that walked speed; False: at the commanded one."""
+    beside: Mapping[str, Effect] = field(default_factory=dict)
+    """Name -> further numbers that are told beside the effect."""
+    also: Mapping[str, Callable[[Measured], bool]] = field(default_factory=dict)
+    """Clause of the published tolerance beside its range -> whether it holds."""
+    note: str = ""
+    """What departs from the configuration, and what is derived."""
+
+
+# Effects from measured numbers --------------------------------------------------------------------------------
+
+
+def difference(name: str, of: Any, against: Any) -> Effect:
+    """Return the effect: a number in one condition less that in another."""
+    return lambda measured: measured[of][name] - measured[against][name]
+
+
+def change(name: str, of: Any, against: Any) -> Effect:
+    """Return the effect: the change of a number from one condition to another [%]."""
+    return lambda measured: 100.0 * (measured[of][name] / measured[against][name] - 1.0)
+
+
+def per_unit(name: str, at: Mapping[Any, float], factor: float = 1.0) -> Effect:
+    """Return the effect: the slope of `factor` times a number over conditions, each `at` a place."""
+    return lambda measured: factor * slope(list(at.values()), [measured[key][name] for key in at])
+
+
+def slope(places: ArrayLike, values: ArrayLike) -> NDArray:
+    """Return the slopes (E,) of the lines of least squares through C conditions' `values` (C, E) over `places`, (C,) or
+    (C, E)."""
+    y = np.asarray(values)
+    x = np.asarray(places)
+    x = np.broadcast_to(x[:, None] if x.ndim == 1 else x, y.shape)
+    x = x - x.mean(0)
+    return (x * y).sum(0) / (x * x).sum(0)
+
+
+def mean_of(effects: Mapping[str, Effect]) -> Effect:
+    """Return the effect: the mean of several."""
+    return lambda measured: np.mean([effect(measured) for effect in effects.values()], axis=0)
+
+
+# Conditions ---------------------------------------------------------------------------------------------------
+
+
+def _both(foot: Any) -> dict[str, Any]:
+    """Return the setting of both feet."""
+    return {"left_foot": foot, "right_foot": foot}
+
+
+def _brace(**numbers: Any) -> dict[str, Any]:
+    """Return a sound foot with an orthosis."""
+    return {"kind": "intact", "orthosis": numbers}
+
+
+def _passive(toe: float) -> dict[str, Any]:
+    """Return a passive right foot with a toe of that stiffness [N m/rad]."""
+    return {"right_foot": {"kind": "passive", "toe_stiffness": toe}}
+
+
+STRENGTHS = (0.2, 0.3)
+"""Strength of weak calves [-]."""
+BRACES = (160.0, 233.0, 305.0, 378.0)
+"""Stiffness of braces on weak calves, 2.8 to 6.6 N m/deg [N m/rad]."""
+_WEAK = {
+    (strength, k): _both({"kind": "weak", "strength": strength, "orthosis": {"ankle_stiffness": k, "ankle_deg": 0.0}})
+    for strength in STRENGTHS
+    for k in BRACES
+}
+_EXO = {
+    k: _both(_brace(ankle_stiffness=k, ankle_deg=-5.7, engages="dorsiflexion"))
+    for k in (0.0, 50.0, 100.0, 150.0, 250.0)
+}
+_TOE = {"locked": _passive(LOCKED), "flexible": _passive(60.0)}
+_STIFF = {1.0: {}} | {factor: _both(_brace(toe_stiffness=(factor - 1.0) * TOE_STIFFNESS)) for factor in (2.0, 4.0)}
+_STIFF_NOTE = f"× 2 and × 4 are springs at the toe beside its own {TOE_STIFFNESS:g} N·m/rad"
+_SLOPES = {"level": {}, "up": {"slope_deg": 4.57}, "down": {"slope_deg": -4.57}}
+_LOADS = {ratio: {"carried_ratio": ratio} for ratio in (0.0, 0.2, 0.4)}
+_LOADS_KG = {ratio: ratio * _BODY.mass for ratio in _LOADS}
+_HEAVY = {1.0: {}} | {
+    ratio: _both({"kind": "intact", "foot_mass_ratio": ratio, "foot_inertia_ratio": ratio}) for ratio in (2.0, 3.0)
+}
+_STOPS = {"free": {}} | {
+    f"stop at {rest:g}°": _both(_brace(ankle_stiffness=1000.0, ankle_deg=rest, engages="plantarflexion"))
+    for rest in (0.0, -5.0, -10.0)
+}
+_ROUGH = {"smooth": {}, "rough": {"unevenness_m": 0.0125}}
+_TOE_ON_SLOPES = {
+    (toe, slope_deg): foot | {"slope_deg": slope_deg} for slope_deg in (5.0, -5.0) for toe, foot in _TOE.items()
+}
+_TOE_ON_ROUGH = {toe: foot | {"unevenness_m": 0.0125} for toe, foot in _TOE.items()}
+_HINGES = {
+    k: {"right_foot": _brace(ankle_stiffness=k, ankle_deg=0.0, engages="dorsiflexion")}
+    for k in (0.0, 14.0, 57.0, 115.0, 212.0)
+}
+
+
+def _grades(*slopes_deg: float) -> dict[Any, dict[str, Any]]:
+    """Return a condition for each slope [deg]."""
+    return {slope_deg: {"slope_deg": slope_deg} if slope_deg else {} for slope_deg in slopes_deg}
+
+
+# Experiments --------------------------------------------------------------------------------------------------
+
+
+def _weak(effect_of: Callable[[float], Effect], **given: Any) -> Experiment:
+    """Return an experiment on weak calves in braces: the mean effect over their strengths."""
+    effects = {f"calf {strength:g}": effect_of(strength) for strength in STRENGTHS}
+    return Experiment(conditions=_WEAK, speed=1.1, effect=mean_of(effects), beside=effects, **given)
+
+
+def _over_braces(name: str) -> Callable[[float], Effect]:
+    """Return the slope of a number over the brace's stiffness [1/(N m/deg)], for calves of a strength."""
+    return lambda strength: per_unit(name, {(strength, k): k / degrees(1.0) for k in BRACES})
+
+
+def _worst_against_best(strength: float) -> Effect:
+    """Return how much more fibre work the dearest brace takes than the cheapest [%], as in the mean over episodes."""
+
+    def effect(measured: Measured) -> NDArray:
+        walks = [measured[strength, k][FIBRE] for k in BRACES]
+        means = [float(np.nanmean(walk)) if np.isfinite(walk).any() else np.nan for walk in walks]
+        if np.isnan(means).any():
+            return np.full(len(walks[0]), np.nan)
+        return 100.0 * (walks[int(np.argmax(means))] / walks[int(np.argmin(means))] - 1.0)
+
+    return effect
+
+
+def _less_at_250(measured: Measured) -> bool:
+    """Return True if the exoskeleton saves less at 250 N m/rad than at 50."""
+    dearer = measured[250.0][FIBRE] - measured[50.0][FIBRE]
+    dearer = dearer[np.isfinite(dearer)]
+    return bool(len(dearer) and dearer.mean() > 0.0)
+
+
+def _per_ankle_work_lost(of_a_step: Callable[[Mapping[str, NDArray]], NDArray]) -> Experiment:
+    """Return an experiment on plantarflexion stops: energy of a step for each joule of positive ankle work lost."""
+
+    def effect(measured: Measured) -> NDArray:
+        walks = [measured[key] for key in _STOPS]
+        return -slope([walk["ankle_positive_J_kg"] for walk in walks], [of_a_step(walk) for walk in walks])
+
+    lost = {f"ankle work, {key}": partial(_number, "ankle_positive_J_kg", key) for key in _STOPS}
+    return Experiment(conditions=_STOPS, speed=1.4, effect=effect, beside=lost)
+
+
+def _number(name: str, key: Any, measured: Measured) -> NDArray:
+    """Return a number of a condition in each episode (E,)."""
+    return measured[key][name]
+
+
+def _slope(of: str) -> Experiment:
+    """Return an experiment on fibre work on a slope, against level ground, with its split between joints."""
+    split = {joint: difference(f"fibre_{joint}_J_kg_m", of, "level") for joint in JOINTS}
+    conditions = {key: _SLOPES[key] for key in ("level", of)}
+    return Experiment(conditions=conditions, speed=1.3, effect=difference(FIBRE, of, "level"), beside=split)
+
+
+def _flexible_toe(name: str, **given: Any) -> Experiment:
+    """Return an experiment on a flexible toe against a locked one on level ground: the change of a number [%]."""
+    return Experiment(
+        **{"conditions": _TOE, "speed": 1.2, "effect": change(name, "flexible", "locked")} | given,
+    )
+
+
+def _stiff_foot(name: str, **given: Any) -> Experiment:
+    """Return an experiment on feet of fourfold bending stiffness: the change of a number [%]."""
+    beside = {"× 2": change(name, 2.0, 1.0)}
+    effect = change(name, 4.0, 1.0)
+    return Experiment(conditions=_STIFF, speed=1.25, effect=effect, beside=beside, note=_STIFF_NOTE, **given)
+
+
+def _rough(name: str) -> Experiment:
+    """Return an experiment on uneven ground: the change of a number [%]."""
+    return Experiment(conditions=_ROUGH, speed=1.0, effect=change(name, "rough", "smooth"))
+
+
+_TOE_SLOPE_WORK = {
+    f"{slope_deg:+g}°": (
+        lambda measured, at=slope_deg: (
+            _BODY.mass * difference("right_push_off_J_kg", ("flexible", at), ("locked", at))(measured)
+        )
+    )
+    for slope_deg in (5.0, -5.0)
+}
+_WHOLE_STRIDE = "positive work over the stride, whose split by phase metrics lack"
+_STROKE = "not run: its people had a stroke; no foot or person here is like theirs"
+
+EXPERIMENTS: dict[str, Experiment | str] = {
+    "afo_dorsiflexion": _weak(
+        _over_braces("dorsiflexion_deg"),
+        walked=False,
+        note="largest value of the mean curve in stance",
+    ),
+    "afo_power": _weak(_over_braces("ankle_power_W_kg"), walked=False, note="largest value of the mean curve"),
+    "afo_range": _weak(_worst_against_best),
+    "exo_saving": Experiment(
+        conditions=_EXO,
+        speed=1.25,
+        effect=change(FIBRE, 50.0, 0.0),
+        beside={f"{k:g} N·m/rad": change(FIBRE, k, 0.0) for k in (100.0, 150.0, 250.0)},
+        also={"less at 250 than at 50": _less_at_250},
+    ),
+    "toe_pushoff": _flexible_toe(
+        "right_push_off_J_kg", note=f"locked is {LOCKED:g} N·m/rad; ankle and toe, {_WHOLE_STRIDE}"
+    ),
+    "toe_com_pushoff": _flexible_toe("right_com_push_off_J_kg", note=f"locked is {LOCKED:g} N·m/rad"),
+    "stiff_foot_cost": _stiff_foot(FIBRE),
+    "slope_up": _slope("up"),
+    "slope_down": _slope("down"),
+    "load_cost": Experiment(conditions=_LOADS, speed=1.25, effect=per_unit(FIBRE, _LOADS_KG, factor=1.25 * _BODY.mass)),
+    "load_com_work": Experiment(
+        conditions=_LOADS,
+        speed=1.25,
+        effect=per_unit("com_positive_W_kg", _LOADS_KG, factor=_BODY.mass),
+        note="derived from mean curves of ground force and CoM velocity, both legs, all of the stride",
+    ),
+    "foot_mass": Experiment(
+        conditions=_HEAVY,
+        speed=1.25,
+        effect=lambda measured: slope(
+            [(ratio - 1.0) * _FEET_KG for ratio in (1.0, 2.0, 3.0)],
+            [100.0 * measured[ratio][FIBRE] / measured[1.0][FIBRE] for ratio in (1.0, 2.0, 3.0)],
+        ),
+        note=f"not as written: {_FEET_KG:.1f} and {2 * _FEET_KG:.1f} kg, as ratios end at 3",
+    ),
+    "waist_mass": "not run: no setting puts a load at the waist",
+    "ankle_k_falls": "not run: it has neither sign nor size; springfoot study identify shows it",
+    "pushoff_collision": _per_ankle_work_lost(lambda walk: walk["collision_J_kg"]),
+    "pushoff_joint_work": _per_ankle_work_lost(
+        lambda walk: np.sum([walk[f"{joint}_positive_J_kg"] for joint in JOINTS], axis=0)
+    ),
+    "pushoff_cost": _per_ankle_work_lost(lambda walk: walk[FIBRE] * walk["step_length_m"]),
+    "rigid_both_cost": Experiment(
+        conditions={SOUND: {}, "rigid": _both("rigid")}, speed=1.25, effect=change(FIBRE, "rigid", SOUND)
+    ),
+    "stay_propulsion": Experiment(
+        conditions={SOUND: {}, "stay": {"right_foot": _brace(ankle_stiffness=1000.0, ankle_deg=0.0)}},
+        speed=0.8,
+        walked=False,
+        effect=difference("right_forward_bw", "stay", SOUND),
+    ),
+    "load_knee_moment": Experiment(
+        conditions={0.0: {}, 0.35: {"carried_ratio": 0.35}},
+        speed=1.5,
+        walked=False,
+        effect=change("knee_moment_Nm_kg", 0.35, 0.0),
+    ),
+    "rough_cost": _rough(FIBRE),
+    "rough_hip_work": _rough("hip_positive_J_kg"),
+    "rough_knee_work": _rough("knee_negative_J_kg"),
+    "toe_slope_pushoff": Experiment(
+        conditions=_TOE_ON_SLOPES,
+        speed=1.1,
+        effect=mean_of(_TOE_SLOPE_WORK),
+        beside=_TOE_SLOPE_WORK,
+        note=f"the mean of both slopes; ankle and toe, {_WHOLE_STRIDE}",
+    ),
+    "toe_slope_knee": Experiment(
+        conditions={key: given for key, given in _TOE_ON_SLOPES.items() if given["slope_deg"] > 0.0},
+        speed=1.1,
+        walked=False,
+        effect=difference("right_knee_at_toe_off_deg", ("flexible", 5.0), ("locked", 5.0)),
+        note="the mean curve at toe-off",
+    ),
+    "toe_rough_hip": _flexible_toe("right_hip_net_J_kg", conditions=_TOE_ON_ROUGH, speed=1.0),
+    "exo_ankle_moment": Experiment(
+        conditions={k: _EXO[k] for k in (0.0, 50.0)},
+        speed=1.25,
+        walked=False,
+        effect=change("ankle_fibres_Nm", 50.0, 0.0),
+        note="largest value of the mean curve of the recorded fibre_moment",
+    ),
+    "stiff_foot_loss": _stiff_foot("toe_negative_J_kg"),
+    "stiff_foot_force": _stiff_foot("ankle_moment_Nm_kg", walked=False),
+    "afo_knee_extension": Experiment(
+        conditions=_HINGES,
+        speed=0.8,
+        walked=False,
+        effect=per_unit("right_knee_straightest_deg", {k: k / degrees(1.0) for k in _HINGES}, factor=-1.0),
+        note="least flexion of the mean curve in stance, turned around, for each N·m/deg",
+    ),
+    "afo_stop_knee": _STROKE,
+    "afo_angle_swing_knee": _STROKE,
+    "clearance_speed": Experiment(
+        conditions={
+            speed: {"right_foot": {"kind": "passive", "ankle_stiffness": 600.0}, "speed": speed}
+            for speed in (0.9, 1.2, 1.5)
+        },
+        speed=1.2,
+        walked=False,
+        effect=per_unit("clearance_sound_less_right_m", {speed: speed for speed in (0.9, 1.2, 1.5)}),
+        note="for each m/s commanded",
+    ),
+    "slope_trailing": Experiment(
+        conditions=_grades(0.0, 3.0, 5.0),
+        speed=1.25,
+        effect=per_unit("push_off_J_kg", {0.0: 0.0, 3.0: 3.0, 5.0: 5.0}),
+        note="for each degree",
+    ),
+    "slope_leading": Experiment(
+        conditions=_grades(0.0, -3.0, -5.0),
+        speed=1.25,
+        effect=per_unit("collision_J_kg", {0.0: 0.0, -3.0: 3.0, -5.0: 5.0}),
+        note="for each degree",
+    ),
+    "slope_hip_share": Experiment(
+        conditions=_grades(-5.0, 0.0, 5.0),
+        speed=1.25,
+        effect=per_unit("hip_share", {-5.0: -5.0, 0.0: 0.0, 5.0: 5.0}),
+        note="derived from the mean curves of power in stance",
+    ),
+}
+"""Name of each effect of docs/effects.csv -> its experiment, or the reason why it is not run."""

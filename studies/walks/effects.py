@@ -1,0 +1,334 @@
+"""Hold a person against effects that laboratories measured in people: docs/effects.csv, a row an effect.
+
+    springfoot study effects
+    springfoot study effects learned runs/person --effects exo_saving rough_cost
+
+Rows, signs, sizes and tolerances were written before they were walked here; the price of energy is fibre work, with all
+of the effort beside it. Conditions of an effect walk the same episodes, so each episode gives a value of the effect.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+import tyro
+
+from springfoot.arrays import NDArray
+from springfoot.errors import SpringfootError, perhaps
+from springfoot.evaluation.recording import record
+from springfoot.files.markdown import MISSING, table
+from springfoot.files.text_table import read_csv
+
+from ..base.intervals import mean_interval
+from ..base.kept import Kept
+from ..base.study import Answer, OnProgress, WalkingStudy
+from ..feet.adapting_persons import person_and_settings
+from ..feet.walked_speeds import Row, at_walked_speeds, rows_csv
+from .effect_experiments import EXPERIMENTS, Experiment, Measured
+from .effect_numbers import EFFECT_NUMBERS, EFFORT, FIBRE, numbers_by_episode
+
+PUBLISHED_EFFECTS = Path("docs", "effects.csv")
+"""Table of published effects, in the repository and in the package."""
+AROUND = (-0.15, 0.0, 0.15)
+"""Commanded speeds less the walked one at which conditions are compared [m/s]; a learned person misses the command by
+0.13 m/s in one walk of twenty."""
+RIGHT = "right"
+UNCLEAR = "unclear"
+"""Sign of an effect whose interval holds 0."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Effects(WalkingStudy):
+    """Walk persons under the conditions of published effects, and hold sign and size against those in people."""
+
+    persons: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="PERSON ...")] = ("learned",)
+    """Policies that move the person: run folders, files, or `learned`."""
+    effects: Annotated[tuple[str, ...], tyro.conf.arg(metavar="EFFECT ...")] = ()
+    """Names of effects to walk, those of docs/effects.csv; none for all."""
+    episodes: int = 5
+    """Episodes of each condition and commanded speed."""
+    seconds: float = 12.0
+    """Length of each episode."""
+    keep: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    """File in which the numbers of each walk are kept, to go on after a stop."""
+
+    QUICK: ClassVar[Mapping[str, Any]] = {
+        "episodes": 1,
+        "seconds": 6.0,
+        "keep": None,
+        "effects": ("slope_up", "stay_propulsion"),
+    }
+
+    def check(self) -> None:
+        """Refuse counts and lengths out of range, and unknown effects."""
+        super().check()
+        for name in self.effects:
+            if name not in EXPERIMENTS:
+                raise SpringfootError(
+                    f"no effect {name!r:.60}; docs/effects.csv lists them{perhaps(name, list(EXPERIMENTS))}"
+                )
+
+    @property
+    def total(self) -> float:
+        """Return the simulated time of all walks if none falls [s]."""
+        chosen = [EXPERIMENTS[name] for name in self.effects or EXPERIMENTS]
+        walks = {str(given) for one in chosen if isinstance(one, Experiment) for _, given in walks_of(one)}
+        return len(self.persons) * len(walks) * self.episodes * self.seconds
+
+    def ask(self, progress: OnProgress) -> Answer:
+        """Walk every person in every experiment."""
+        kept = Kept(self.keep)
+        rows = []
+        for published in published_effects():
+            name = published["name"]
+            if self.effects and name not in self.effects:
+                continue
+            experiment = EXPERIMENTS[name]
+            walks = {}
+            if isinstance(experiment, Experiment):
+                walks = {person: self._walks(experiment, person, kept, progress) for person in self.persons}
+            rows.append(effect_row(published, experiment, walks))
+        return Answer(text=self._text(rows), files={"effects.csv": rows_csv(rows)})
+
+    def _walks(self, experiment: Experiment, person: str, kept: Kept, progress: OnProgress) -> list[Row]:
+        """Return a row for each condition, commanded speed and episode of an experiment."""
+        rows = []
+        for condition, given in walks_of(experiment):
+
+            def make(given: Mapping[str, Any] = given) -> dict[str, Any]:
+                """Walk; return the numbers of each episode."""
+                act, settings = person_and_settings(person, {**given, "episode_seconds": self.seconds})
+                return {
+                    "episodes": numbers_by_episode(record(act, settings, name=person, progress=progress, **self.how))
+                }
+
+            question = [{**self.how, "threads": 0, "seconds": self.seconds}, person, given, EFFECT_NUMBERS]
+            for episode, numbers in enumerate(kept.get(question, make)["episodes"]):
+                rows.append({"condition": condition, "episode": episode, "speed_m_s": given["speed"], **numbers})
+        return rows
+
+    def _text(self, rows: Sequence[Row]) -> str:
+        """Return the report."""
+        not_run = [f"- {row['effect']}: {row['note'].removeprefix('not run: ')}." for row in rows if not row["run"]]
+        without = [f"Not run:\n\n{chr(10).join(not_run)}"] if not_run else []
+        return "\n\n".join(
+            [
+                f"**{verdict(rows)}**",
+                effects_table([row for row in rows if row["run"]]),
+                f"Persons: {', '.join(self.persons)}; {self.what_ran} of each condition. In brackets 95 % intervals "
+                "over persons and episodes; a sign is unclear where the interval holds 0. Energy and work are compared "
+                "where all conditions walk equally fast, all else at the commanded speed. effects.csv tells the rest.",
+                *without,
+            ]
+        )
+
+
+def published_effects() -> list[dict[str, str]]:
+    """Return the rows of `PUBLISHED_EFFECTS`, column -> text."""
+    effects = read_csv(Path(__file__).resolve().parents[2] / PUBLISHED_EFFECTS)
+    return [dict(zip(effects.columns, cells, strict=True)) for _, cells in effects.rows]
+
+
+def walks_of(experiment: Experiment) -> list[tuple[Any, dict[str, Any]]]:
+    """Return the condition and the settings of each walk of an experiment."""
+    around = AROUND if experiment.walked else (0.0,)
+    return [
+        (condition, {"speed": round(experiment.speed + more, 6), **given})
+        for (condition, given), more in product(experiment.conditions.items(), around)
+    ]
+
+
+def measured_of(experiment: Experiment, walks: Sequence[Row]) -> Measured:
+    """Return the numbers of each condition and episode: at the walked speed of the experiment, or as walked."""
+    if experiment.walked:
+        walks = at_walked_speeds(walks, ("condition", "episode"), (experiment.speed,), EFFECT_NUMBERS)
+    episodes = {
+        key: sorted((row for row in walks if row["condition"] == key), key=lambda row: row["episode"])
+        for key in experiment.conditions
+    }
+    return {
+        key: {name: np.array([row[name] for row in rows], float) for name in EFFECT_NUMBERS}  # None becomes NaN
+        for key, rows in episodes.items()
+    }
+
+
+def effect_row(
+    published: Mapping[str, str], experiment: Experiment | str, walks: Mapping[str, Sequence[Row]]
+) -> dict[str, Any]:
+    """Return the row of an effect: published, measured, and how the two agree.
+
+    `walks` are those of each person, as of `Effects`; none for an experiment that is not run. Episodes count in which
+    no condition falls.
+    """
+    columns = ("seen", "people", "sign", "size", "unit", "tolerance")
+    row: dict[str, Any] = {"effect": published["name"], **{name: published[name] or None for name in columns}}
+    row |= {"run": int(not isinstance(experiment, str))}
+    row |= dict.fromkeys(
+        ("measured", "low", "high", "effort", "sign_is", "size_within", "pairs", "walked_m_s", "falls")
+    )
+    if isinstance(experiment, str):
+        return row | {"beside": None, "note": experiment} | (dict.fromkeys(walks) if len(walks) > 1 else {})
+    measured = {person: measured_of(experiment, own) for person, own in walks.items()}
+    with np.errstate(invalid="ignore", divide="ignore"):
+        values = {person: _known(experiment.effect(numbers)) for person, numbers in measured.items()}
+        efforts = {person: _known(experiment.effect(_with_effort(numbers))) for person, numbers in measured.items()}
+        beside = {
+            name: _mean([_known(effect(numbers)) for numbers in measured.values()])
+            for name, effect in experiment.beside.items()
+        }
+    notes = [experiment.note, *_falls(walks.values())]
+    if all(map(len, values.values())):
+        pairs = np.concatenate(list(values.values()))
+        low, high = mean_interval(pairs)
+        mean = float(pairs.mean())
+        also = {words: all(map(holds, measured.values())) for words, holds in experiment.also.items()}
+        row |= {"measured": mean, "low": low, "high": high, "pairs": len(pairs)}
+        row |= {"sign_is": sign_is(published["sign"], low, high)}
+        row |= {"size_within": size_within(published, mean, also)}
+        notes += [f"{words}: {'yes' if holds else 'no'}" for words, holds in also.items()]
+        if any(not np.array_equal(values[person], efforts[person]) for person in values):  # the effect is of energy
+            row["effort"] = _mean(list(efforts.values()))
+    else:
+        notes.append(
+            f"no episode has all numbers: {', '.join(_unknown(measured.values()))} falls or is too slow or fast"
+        )
+    row |= {"walked_m_s": _walked(measured.values()), "falls": _share([one for own in walks.values() for one in own])}
+    row |= {"beside": "; ".join(f"{name} {_text(value)}" for name, value in beside.items()) or None}
+    row |= {"note": "; ".join(filter(None, notes)) or None}
+    return row | ({person: _mean([own]) for person, own in values.items()} if len(values) > 1 else {})
+
+
+def _with_effort(measured: Measured) -> Measured:
+    """Return the numbers with all of the effort in the place of fibre work."""
+    return {key: {**numbers, FIBRE: numbers[EFFORT]} for key, numbers in measured.items()}
+
+
+def _known(values: NDArray) -> NDArray:
+    """Return the values that are finite."""
+    return values[np.isfinite(values)]
+
+
+def _mean(values: Sequence[NDArray]) -> float | None:
+    """Return the mean of several persons' values; None without any."""
+    together = np.concatenate(values)
+    return float(together.mean()) if len(together) else None
+
+
+def _walked(measured: Any) -> str:
+    """Return the walked speeds of the conditions in words [m/s]."""
+    speeds = [float(np.mean(known)) for one in measured for key in one if len(known := _known(one[key]["walked_m_s"]))]
+    return " to ".join(dict.fromkeys(f"{end:.2f}" for end in (min(speeds), max(speeds)))) if speeds else MISSING
+
+
+def _unknown(measured: Any) -> list[str]:
+    """Return the conditions without a number, in words."""
+    return sorted({_label(key) for one in measured for key in one if not len(_known(one[key][FIBRE]))})
+
+
+def _share(walks: Sequence[Row]) -> str:
+    """Return how many of the episodes fell, as in "2 of 20"."""
+    return f"{sum(int(walk['falls']) for walk in walks)} of {len(walks)}"
+
+
+def _falls(walks: Any) -> list[str]:
+    """Return, in words, the conditions in which somebody falls."""
+    by_walk: dict[tuple[Any, float], list[Row]] = {}
+    for own in walks:
+        for walk in own:
+            by_walk.setdefault((walk["condition"], walk["speed_m_s"]), []).append(walk)
+    return [
+        f"falls {_share(rows)} in {_label(key)} at {speed:g} m/s"
+        for (key, speed), rows in by_walk.items()
+        if any(row["falls"] for row in rows)
+    ]
+
+
+def _label(key: Any) -> str:
+    """Return a condition in words."""
+    return " ".join(map(_label, key)) if isinstance(key, tuple) else f"{key:g}" if isinstance(key, float) else key
+
+
+# Agreement ----------------------------------------------------------------------------------------------------
+
+
+def sign_is(sign: str, low: float, high: float) -> str | None:
+    """Return whether an effect with the interval `low` to `high` has the published `sign`; None without one."""
+    if not sign:
+        return None
+    if low <= 0.0 <= high:
+        return UNCLEAR
+    return RIGHT if (low > 0.0) == (sign == "+") else "wrong"
+
+
+def size_within(published: Mapping[str, str], measured: float, also: Mapping[str, bool]) -> int | None:
+    """Return 1 if a measured effect is within the published tolerance, else 0; None where that has no size.
+
+    `also` tells of each further clause of the tolerance whether it holds. Raises `SpringfootError` for a clause that is
+    not understood.
+    """
+    first, *clauses = published["tolerance"].split("; ")
+    if set(clauses) != set(also):
+        raise SpringfootError(f"{published['name']}: the tolerance {published['tolerance']!r} is not understood")
+    if first == "sign only":
+        return None
+    if factor := re.fullmatch(r"within a factor of ([\d.]+)", first):
+        ratio = measured / float(published["size"])
+        within = 1.0 / float(factor[1]) <= ratio <= float(factor[1])
+    elif ends := re.fullmatch(r"(-?[\d.]+) to (-?[\d.]+)", first):
+        within = min(map(float, ends.groups())) <= measured <= max(map(float, ends.groups()))
+    else:
+        raise SpringfootError(f"{published['name']}: the tolerance {published['tolerance']!r} is not understood")
+    return int(within and all(also.values()))
+
+
+def verdict(rows: Sequence[Row]) -> str:
+    """Return how many signs are right and how many sizes within, of effects seen before and of the others.
+
+    An effect that was walked and has no number counts as missed.
+    """
+    parts = []
+    for seen, words in (("yes", "seen before"), ("no", "not seen before")):
+        own = [row for row in rows if row["seen"] == seen]
+        walked = [row for row in own if row["run"]]
+        signs = [row["sign_is"] for row in walked if row["sign"]]
+        sizes = [row["size_within"] for row in walked if row["tolerance"] != "sign only"]
+        parts.append(
+            f"of {len(own)} effects {words}, {len(walked)} walked, signs are right in {signs.count(RIGHT)} of "
+            f"{len(signs)} (unclear {signs.count(UNCLEAR)}), sizes within in {sizes.count(1)} of {len(sizes)}"
+        )
+    sentence = "; ".join(parts)
+    return f"{sentence[:1].upper()}{sentence[1:]}."
+
+
+def effects_table(rows: Sequence[Row]) -> str:
+    """Return the Markdown table of the effects that were walked."""
+    lines = []
+    for row in rows:
+        published = f"{row['sign'] or ''} {row['size'] or ''} {row['unit'] or ''}".strip()
+        if row["size"]:
+            published = f"{row['size']} {row['unit']}"
+        interval = "" if row["measured"] is None else f" ({_text(row['low'])} to {_text(row['high'])})"
+        lines.append(
+            [
+                row["effect"],
+                row["seen"],
+                published,
+                f"{_text(row['measured'])}{interval}",
+                row["sign_is"] or MISSING,
+                {1: "yes", 0: "no"}.get(row["size_within"], MISSING),
+                _text(row["effort"]),
+                row["walked_m_s"],
+                row["falls"],
+            ]
+        )
+    head = ["effect", "seen", "people", "here", "sign", "within", "by effort", "walked, m/s", "falls"]
+    return table(head, lines)
+
+
+def _text(value: float | None) -> str:
+    """Return a number with three digits."""
+    return MISSING if value is None else f"{value:.3g}".replace("-", "−")
