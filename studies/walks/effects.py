@@ -9,7 +9,8 @@ of the effort beside it. Conditions of an effect walk the same episodes, so each
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import product
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
@@ -17,9 +18,12 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 import tyro
 
+from springfoot.agents.policies import PolicyFunction
 from springfoot.arrays import NDArray
+from springfoot.envs import BipedSettings
+from springfoot.envs.settings import FOOT_SETTINGS
 from springfoot.errors import SpringfootError, perhaps
-from springfoot.evaluation.recording import record
+from springfoot.evaluation.recording import record_feet
 from springfoot.files.markdown import MISSING, table
 from springfoot.files.text_table import read_csv
 
@@ -97,19 +101,36 @@ class Effects(WalkingStudy):
     def _walks(self, experiment: Experiment, person: str, kept: Kept, progress: OnProgress) -> list[Row]:
         """Return a row for each condition, commanded speed and episode of an experiment."""
         rows = []
-        for condition, given in walks_of(experiment):
+        walks = walks_of(experiment)
+        numbers: dict[str, list[dict[str, float | None]]] = {}  # of what is walked now, by settings
+        for index, (condition, given) in enumerate(walks):
 
-            def make(given: Mapping[str, Any] = given) -> dict[str, Any]:
-                """Walk; return the numbers of each episode."""
-                act, settings = person_and_settings(person, {**given, "episode_seconds": self.seconds})
-                return {
-                    "episodes": numbers_by_episode(record(act, settings, name=person, progress=progress, **self.how))
-                }
+            def make(given: dict[str, Any] = given, rest: Any = walks[index:]) -> dict[str, Any]:
+                """Walk, side by side with what differs in feet alone; return the numbers of each episode."""
+                if str(given) not in numbers:
+                    alike = [other for _, other in rest if _without_feet(other) == _without_feet(given)]
+                    numbers.update(zip(map(str, alike), self._side_by_side(person, alike, progress), strict=True))
+                return {"episodes": numbers[str(given)]}
 
             question = [{**self.how, "threads": 0, "seconds": self.seconds}, person, given, EFFECT_NUMBERS]
-            for episode, numbers in enumerate(kept.get(question, make)["episodes"]):
-                rows.append({"condition": condition, "episode": episode, "speed_m_s": given["speed"], **numbers})
+            for episode, measured in enumerate(kept.get(question, make)["episodes"]):
+                rows.append({"condition": condition, "episode": episode, "speed_m_s": given["speed"], **measured})
         return rows
+
+    def _side_by_side(
+        self, person: str, walks: Sequence[Mapping[str, Any]], progress: OnProgress
+    ) -> list[list[dict[str, float | None]]]:
+        """Return the numbers by episode of walks whose settings differ in feet alone."""
+        act, settings = self._persons[person]
+        settings = replace(settings, **_without_feet(walks[0]))
+        feet = [{name: walk[name] for name in FOOT_SETTINGS if name in walk} for walk in walks]
+        recordings = record_feet(act, settings, feet, name=person, progress=progress, **self.how)
+        return [numbers_by_episode(recording) for recording in recordings]
+
+    @cached_property
+    def _persons(self) -> dict[str, tuple[PolicyFunction, BipedSettings]]:
+        """Return each person's policy and settings, read once."""
+        return {name: person_and_settings(name, {"episode_seconds": self.seconds}) for name in self.persons}
 
     def _text(self, rows: Sequence[Row]) -> str:
         """Return the report."""
@@ -125,6 +146,11 @@ class Effects(WalkingStudy):
                 *without,
             ]
         )
+
+
+def _without_feet(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return settings but those of feet."""
+    return {name: value for name, value in given.items() if name not in FOOT_SETTINGS}
 
 
 def published_effects() -> list[dict[str, str]]:
