@@ -39,11 +39,13 @@ class Experiment:
     conditions: Mapping[Any, Mapping[str, Any]]
     """Condition -> settings that differ from the sound walk."""
     speed: float
-    """Speed [m/s], walked or commanded."""
+    """Commanded speed [m/s]."""
     effect: Effect
     """The effect."""
     walked: bool = True
-    """True: all conditions are compared at that walked speed; False: at the commanded one."""
+    """True: conditions are compared where all walk as fast; False: as commanded."""
+    at: float | None = None
+    """Walked speed at which they are compared [m/s]; None for that of `speed`."""
     beside: Mapping[str, Effect] = field(default_factory=dict)
     """Name -> further numbers that are told beside the effect."""
     also: Mapping[str, Callable[[Measured], bool]] = field(default_factory=dict)
@@ -239,7 +241,7 @@ EXPERIMENTS: dict[str, Experiment | str] = {
         note="largest value of the mean curve in stance",
     ),
     "afo_power": _weak(_over_braces("ankle_power_W_kg"), walked=False, note="largest value of the mean curve"),
-    "afo_range": _weak(_worst_against_best),
+    "afo_range": _weak(_worst_against_best, at=1.05, note="at 1.05 m/s, as one brace does not reach 1.1"),
     "exo_saving": Experiment(
         conditions=_EXO,
         speed=1.25,

@@ -169,9 +169,10 @@ def walks_of(experiment: Experiment) -> list[tuple[Any, dict[str, Any]]]:
 
 
 def measured_of(experiment: Experiment, walks: Sequence[Row]) -> Measured:
-    """Return the numbers of each condition and episode: at the walked speed of the experiment, or as walked."""
+    """Return the numbers of each condition and episode: where all walk as fast, or as commanded."""
     if experiment.walked:
-        walks = at_walked_speeds(walks, ("condition", "episode"), (experiment.speed,), EFFECT_NUMBERS)
+        speed = experiment.speed if experiment.at is None else experiment.at
+        walks = at_walked_speeds(walks, ("condition", "episode"), (speed,), EFFECT_NUMBERS)
     episodes = {
         key: sorted((row for row in walks if row["condition"] == key), key=lambda row: row["episode"])
         for key in experiment.conditions
@@ -215,6 +216,8 @@ def effect_row(
         row |= {"measured": mean, "low": low, "high": high, "pairs": len(pairs)}
         row |= {"sign_is": sign_is(published["sign"], low, high)}
         row |= {"size_within": size_within(published, mean, also)}
+        if len(pairs) < (episodes := sum(len({walk["episode"] for walk in own}) for own in walks.values())):
+            notes.append(f"of {len(pairs)} of {episodes} episodes, in which all walk, and as fast")
         notes += [f"{words}: {'yes' if holds else 'no'}" for words, holds in also.items()]
         if any(not np.array_equal(values[person], efforts[person]) for person in values):  # the effect is of energy
             row["effort"] = _mean(list(efforts.values()))

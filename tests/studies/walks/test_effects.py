@@ -149,7 +149,7 @@ def test_falls_are_told_left_out_in_pairs_and_a_condition_in_which_all_fall_is_a
 
     row = row_of("stay_propulsion", {"one": planted("stay_propulsion", numbers, falls={("stay", 0)})})
     assert (row["measured"], row["pairs"], row["falls"]) == (pytest.approx(-0.1), 2, "1 of 6")
-    assert row["note"] == "falls 1 of 3 in stay at 0.8 m/s"
+    assert row["note"] == "falls 1 of 3 in stay at 0.8 m/s; of 2 of 3 episodes, in which all walk, and as fast"
     everyone = {("stay", episode) for episode in range(3)}
     row = row_of("stay_propulsion", {"one": planted("stay_propulsion", numbers, falls=everyone)})
     assert (row["measured"], row["sign_is"], row["falls"]) == (None, None, "3 of 6")
