@@ -25,8 +25,8 @@ Measured = Mapping[Any, Mapping[str, NDArray]]
 """Condition -> number -> its value in each of E episodes (E,), NaN where it is unknown."""
 Effect = Callable[[Measured], NDArray]
 """Function that returns an effect in each episode (E,)."""
-SOUND = "sound"
-LOCKED = 1000.0
+_SOUND = "sound"
+LOCKED_TOE = 1000.0
 """Stiffness of a passive foot's toe that is called locked, the largest [N m/rad]."""
 _BODY = body_of(BipedSettings())
 _FEET_KG = 2.0 * (_BODY.foot_mass + _BODY.toe_mass)
@@ -118,7 +118,7 @@ _EXO = {
     k: _both(_brace(ankle_stiffness=k, ankle_deg=-5.7, engages="dorsiflexion"))
     for k in (0.0, 50.0, 100.0, 150.0, 250.0)
 }
-_TOE = {"locked": _passive(LOCKED), "flexible": _passive(60.0)}
+_TOE = {"locked": _passive(LOCKED_TOE), "flexible": _passive(60.0)}
 _STIFF = {1.0: {}} | {factor: _both(_brace(toe_stiffness=(factor - 1.0) * TOE_STIFFNESS)) for factor in (2.0, 4.0)}
 _STIFF_NOTE = f"× 2 and × 4 are springs at the toe beside its own {TOE_STIFFNESS:g} N·m/rad"
 _SLOPES = {"level": {}, "up": {"slope_deg": 4.57}, "down": {"slope_deg": -4.57}}
@@ -250,9 +250,9 @@ EXPERIMENTS: dict[str, Experiment | str] = {
         also={"less at 250 than at 50": _less_at_250},
     ),
     "toe_pushoff": _flexible_toe(
-        "right_push_off_J_kg", note=f"locked is {LOCKED:g} N·m/rad; ankle and toe, {_WHOLE_STRIDE}"
+        "right_push_off_J_kg", note=f"locked is {LOCKED_TOE:g} N·m/rad; ankle and toe, {_WHOLE_STRIDE}"
     ),
-    "toe_com_pushoff": _flexible_toe("right_com_push_off_J_kg", note=f"locked is {LOCKED:g} N·m/rad"),
+    "toe_com_pushoff": _flexible_toe("right_com_push_off_J_kg", note=f"locked is {LOCKED_TOE:g} N·m/rad"),
     "stiff_foot_cost": _stiff_foot(FIBRE),
     "slope_up": _slope("up"),
     "slope_down": _slope("down"),
@@ -280,13 +280,13 @@ EXPERIMENTS: dict[str, Experiment | str] = {
     ),
     "pushoff_cost": _per_ankle_work_lost(lambda walk: walk[FIBRE] * walk["step_length_m"]),
     "rigid_both_cost": Experiment(
-        conditions={SOUND: {}, "rigid": _both("rigid")}, speed=1.25, effect=change(FIBRE, "rigid", SOUND)
+        conditions={_SOUND: {}, "rigid": _both("rigid")}, speed=1.25, effect=change(FIBRE, "rigid", _SOUND)
     ),
     "stay_propulsion": Experiment(
-        conditions={SOUND: {}, "stay": {"right_foot": _brace(ankle_stiffness=1000.0, ankle_deg=0.0)}},
+        conditions={_SOUND: {}, "stay": {"right_foot": _brace(ankle_stiffness=1000.0, ankle_deg=0.0)}},
         speed=0.8,
         walked=False,
-        effect=difference("right_forward_bw", "stay", SOUND),
+        effect=difference("right_forward_bw", "stay", _SOUND),
     ),
     "load_knee_moment": Experiment(
         conditions={0.0: {}, 0.35: {"carried_ratio": 0.35}},

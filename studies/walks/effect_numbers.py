@@ -18,14 +18,14 @@ from springfoot.gait.people import on_percent
 
 from ..feet.walked_speeds import TWO_PRICES
 
-FIBRE, EFFORT = TWO_PRICES
+FIBRE, ALL_EFFORT = TWO_PRICES
 """Fibre work, and all of the effort as energy: its part of work is fibre work [J/kg/m] each."""
 STRIDE_JOINTS = ("hip", "knee", "ankle")
 """Joints whose power has a curve over the stride."""
 _RIGHT = SIDES.index("right")
 
 EFFECT_NUMBERS = (
-    *("walked_m_s", FIBRE, EFFORT, "step_length_m"),
+    *("walked_m_s", FIBRE, ALL_EFFORT, "step_length_m"),
     *(f"fibre_{joint}_J_kg_m" for joint in JOINTS),
     *(f"{joint}_{sign}_J_kg" for joint in JOINTS for sign in ("positive", "negative")),
     *("push_off_J_kg", "collision_J_kg", "com_positive_W_kg", "hip_share"),
@@ -74,7 +74,7 @@ def _of_both_legs(gait: Gait, recording: Recording) -> dict[str, float | None]:
     return {
         "walked_m_s": metrics["speed_m_s"]["mean"],
         FIBRE: effort["fibre_J_kg_m"],
-        EFFORT: GRAVITY * effort["total"] * body.total_mass / body.mass,
+        ALL_EFFORT: GRAVITY * effort["total"] * body.total_mass / body.mass,
         "step_length_m": metrics["step_length_m"],
         **{f"fibre_{joint}_J_kg_m": effort["per_joint"][joint]["fibre_J_kg_m"] for joint in JOINTS},
         **{

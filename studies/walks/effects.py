@@ -33,14 +33,14 @@ from ..base.study import Answer, OnProgress, WalkingStudy
 from ..feet.adapting_persons import person_and_settings
 from ..feet.walked_speeds import Row, at_walked_speeds, rows_csv
 from .effect_experiments import EXPERIMENTS, Experiment, Measured
-from .effect_numbers import EFFECT_NUMBERS, EFFORT, FIBRE, numbers_by_episode
+from .effect_numbers import ALL_EFFORT, EFFECT_NUMBERS, FIBRE, numbers_by_episode
 
 PUBLISHED_EFFECTS = Path("docs", "effects.csv")
 """Table of published effects, in the repository and in the package."""
 AROUND = (-0.15, 0.0, 0.15)
 """Commanded speeds less the walked one at which conditions are compared [m/s]; a learned person misses the command by
 0.13 m/s in one walk of twenty."""
-RIGHT = "right"
+_RIGHT = "right"
 UNCLEAR = "unclear"
 """Sign of an effect whose interval holds 0."""
 
@@ -233,7 +233,7 @@ def effect_row(
 
 def _with_effort(measured: Measured) -> Measured:
     """Return the numbers with all of the effort in the place of fibre work."""
-    return {key: {**numbers, FIBRE: numbers[EFFORT]} for key, numbers in measured.items()}
+    return {key: {**numbers, FIBRE: numbers[ALL_EFFORT]} for key, numbers in measured.items()}
 
 
 def _known(values: NDArray) -> NDArray:
@@ -290,7 +290,7 @@ def sign_is(sign: str, low: float, high: float) -> str | None:
         return None
     if low <= 0.0 <= high:
         return UNCLEAR
-    return RIGHT if (low > 0.0) == (sign == "+") else "wrong"
+    return _RIGHT if (low > 0.0) == (sign == "+") else "wrong"
 
 
 def size_within(published: Mapping[str, str], measured: float, also: Mapping[str, bool]) -> int | None:
@@ -326,7 +326,7 @@ def verdict(rows: Sequence[Row]) -> str:
         signs = [row["sign_is"] for row in walked if row["sign"]]
         sizes = [row["size_within"] for row in walked if row["tolerance"] != "sign only"]
         parts.append(
-            f"of {len(own)} effects {words}, {len(walked)} walked, signs are right in {signs.count(RIGHT)} of "
+            f"of {len(own)} effects {words}, {len(walked)} walked, signs are right in {signs.count(_RIGHT)} of "
             f"{len(signs)} (unclear {signs.count(UNCLEAR)}), sizes within in {sizes.count(1)} of {len(sizes)}"
         )
     sentence = "; ".join(parts)

@@ -11,7 +11,7 @@ from springfoot.errors import SpringfootError
 from springfoot.evaluation.numbers import measure
 from springfoot.evaluation.recording import policy_and_settings, record
 from springfoot.studies.walks.effect_experiments import BRACES, EXPERIMENTS, STRENGTHS, Experiment, slope
-from springfoot.studies.walks.effect_numbers import EFFECT_NUMBERS, EFFORT, FIBRE, com_power, numbers_by_episode
+from springfoot.studies.walks.effect_numbers import ALL_EFFORT, EFFECT_NUMBERS, FIBRE, com_power, numbers_by_episode
 from springfoot.studies.walks.effects import (
     AROUND,
     effect_row,
@@ -100,7 +100,7 @@ def test_a_planted_slope_comes_back_at_equal_walked_speed_with_effort_beside():
     def numbers(condition, speed, episode):
         up = condition == "up"
         walked = speed - 0.1 * up
-        return {"walked_m_s": walked, FIBRE: 2.0 * walked + 2.8 * up + 0.01 * episode, EFFORT: 10.0 + 5.0 * up}
+        return {"walked_m_s": walked, FIBRE: 2.0 * walked + 2.8 * up + 0.01 * episode, ALL_EFFORT: 10.0 + 5.0 * up}
 
     row = row_of("slope_up", {"one": planted("slope_up", numbers)})
     assert row["measured"] == pytest.approx(2.8) and row["effort"] == pytest.approx(5.0)
@@ -177,7 +177,7 @@ def test_power_on_the_com_from_mean_curves_has_the_measured_push_off():
     assert push_off == pytest.approx(gait.metrics["com_work_J_kg"]["push_off"], rel=0.1)
     (numbers,) = numbers_by_episode(recording)
     assert set(numbers) == {"falls", *EFFECT_NUMBERS} and None not in numbers.values()
-    assert numbers[EFFORT] > numbers[FIBRE] == gait.metrics["effort"]["fibre_J_kg_m"]
+    assert numbers[ALL_EFFORT] > numbers[FIBRE] == gait.metrics["effort"]["fibre_J_kg_m"]
     assert 0.0 < numbers["hip_share"] < 1.0 and numbers["com_positive_W_kg"] > push_off / 0.6
 
 
