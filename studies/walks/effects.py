@@ -222,9 +222,7 @@ def effect_row(
         if any(not np.array_equal(values[person], efforts[person]) for person in values):  # the effect is of energy
             row["effort"] = _mean(list(efforts.values()))
     else:
-        notes.append(
-            f"no episode has all numbers: {', '.join(_unknown(measured.values()))} falls or is too slow or fast"
-        )
+        notes.append(f"no episode has all numbers: {', '.join(_unknown(measured.values(), walks.values()))}")
     row |= {"walked_m_s": _walked(measured.values()), "falls": _share([one for own in walks.values() for one in own])}
     row |= {"beside": "; ".join(f"{name} {_text(value)}" for name, value in beside.items()) or None}
     row |= {"note": "; ".join(filter(None, notes)) or None}
@@ -253,9 +251,15 @@ def _walked(measured: Any) -> str:
     return " to ".join(dict.fromkeys(f"{end:.2f}" for end in (min(speeds), max(speeds)))) if speeds else MISSING
 
 
-def _unknown(measured: Any) -> list[str]:
-    """Return the conditions without a number, in words."""
-    return sorted({_label(key) for one in measured for key in one if not len(_known(one[key][FIBRE]))})
+def _unknown(measured: Any, walks: Any) -> list[str]:
+    """Return, in words, the conditions without a number and how they walk."""
+    told = []
+    for key in dict.fromkeys(key for one in measured for key in one if not len(_known(one[key][FIBRE]))):
+        rows = [row for own in walks for row in own if row["condition"] == key]
+        speeds = [row["walked_m_s"] for row in rows if row["walked_m_s"] is not None]
+        how = f"walks {min(speeds):.2f} to {max(speeds):.2f} m/s" if speeds else "always falls"
+        told.append(f"{_label(key)} {how}")
+    return told
 
 
 def _share(walks: Sequence[Row]) -> str:

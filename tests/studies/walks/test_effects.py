@@ -153,7 +153,18 @@ def test_falls_are_told_left_out_in_pairs_and_a_condition_in_which_all_fall_is_a
     everyone = {("stay", episode) for episode in range(3)}
     row = row_of("stay_propulsion", {"one": planted("stay_propulsion", numbers, falls=everyone)})
     assert (row["measured"], row["sign_is"], row["falls"]) == (None, None, "3 of 6")
+    assert row["note"].endswith("no episode has all numbers: stay always falls")
     assert "signs are right in 0 of 1" in verdict([row]) and "| – |" in effects_table([row])
+
+
+def test_a_condition_that_does_not_reach_the_speed_is_a_miss_that_tells_its_speed():
+    def slow(condition, speed, episode):
+        return {"walked_m_s": 0.6 * speed if condition == "rigid" else speed}
+
+    row = row_of("rigid_both_cost", {"one": planted("rigid_both_cost", slow)})
+    assert (row["measured"], row["size_within"], row["falls"]) == (None, None, "0 of 18")
+    assert row["note"] == "no episode has all numbers: rigid walks 0.66 to 0.84 m/s"
+    assert "sizes within in 0 of 1" in verdict([row])
 
 
 def test_several_persons_have_a_value_each():
@@ -175,8 +186,9 @@ def test_power_on_the_com_from_mean_curves_has_the_measured_push_off():
     double_support = slice(50, round(gait.metrics["toe_off_percent"]) + 1)  # as the trailing leg
     push_off = power[double_support].sum() * percent_seconds
     assert push_off == pytest.approx(gait.metrics["com_work_J_kg"]["push_off"], rel=0.1)
-    (numbers,) = numbers_by_episode(recording)
-    assert set(numbers) == {"falls", *EFFECT_NUMBERS} and None not in numbers.values()
+    (measured,) = numbers_by_episode(recording)
+    numbers = {name: value for name, value in measured.items() if value is not None}
+    assert set(numbers) == {"falls", *EFFECT_NUMBERS}
     assert numbers[ALL_EFFORT] > numbers[FIBRE] == gait.metrics["effort"]["fibre_J_kg_m"]
     assert 0.0 < numbers["hip_share"] < 1.0 and numbers["com_positive_W_kg"] > push_off / 0.6
 
