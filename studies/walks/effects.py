@@ -42,7 +42,7 @@ AROUND = (-0.15, 0.0, 0.15)
 0.13 m/s in one walk of twenty."""
 _RIGHT = "right"
 UNCLEAR = "unclear"
-"""Sign of an effect whose interval holds 0."""
+"""Sign of an effect whose interval holds 0, or of a single episode, which has none."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -141,7 +141,7 @@ class Effects(WalkingStudy):
                 f"**{verdict(rows)}**",
                 effects_table([row for row in rows if row["run"]]),
                 f"Persons: {', '.join(self.persons)}; {self.what_ran} of each condition. In brackets 95 % intervals "
-                "over persons and episodes; a sign is unclear where the interval holds 0. Energy and work are compared "
+                "over persons and episodes; a sign is unclear where the interval holds 0 or one episode is left. Energy and work are compared "
                 "where all conditions walk equally fast, all else at the commanded speed. effects.csv tells the rest.",
                 *without,
             ]
@@ -210,7 +210,7 @@ def effect_row(
     notes = [experiment.note, *_falls(walks.values())]
     if all(map(len, values.values())):
         pairs = np.concatenate(list(values.values()))
-        low, high = mean_interval(pairs)
+        low, high = mean_interval(pairs) if len(pairs) > 1 else (None, None)
         mean = float(pairs.mean())
         also = {words: all(map(holds, measured.values())) for words, holds in experiment.also.items()}
         row |= {"measured": mean, "low": low, "high": high, "pairs": len(pairs)}
@@ -288,11 +288,11 @@ def _label(key: Any) -> str:
 # Agreement ----------------------------------------------------------------------------------------------------
 
 
-def sign_is(sign: str, low: float, high: float) -> str | None:
+def sign_is(sign: str, low: float | None, high: float | None) -> str | None:
     """Return whether an effect with the interval `low` to `high` has the published `sign`; None without one."""
     if not sign:
         return None
-    if low <= 0.0 <= high:
+    if low is None or high is None or low <= 0.0 <= high:
         return UNCLEAR
     return _RIGHT if (low > 0.0) == (sign == "+") else "wrong"
 
@@ -344,7 +344,7 @@ def effects_table(rows: Sequence[Row]) -> str:
         published = f"{row['sign'] or ''} {row['size'] or ''} {row['unit'] or ''}".strip()
         if row["size"]:
             published = f"{row['size']} {row['unit']}"
-        interval = "" if row["measured"] is None else f" ({_text(row['low'])} to {_text(row['high'])})"
+        interval = "" if row["low"] is None else f" ({_text(row['low'])} to {_text(row['high'])})"
         lines.append(
             [
                 row["effect"],
