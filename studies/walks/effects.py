@@ -141,7 +141,8 @@ class Effects(WalkingStudy):
                 f"**{verdict(rows)}**",
                 effects_table([row for row in rows if row["run"]]),
                 f"Persons: {', '.join(self.persons)}; {self.what_ran} of each condition. In brackets 95 % intervals "
-                "over persons and episodes; a sign is unclear where the interval holds 0 or one episode is left. Energy and work are compared "
+                "over persons and episodes; a sign is unclear where the interval holds 0 or one episode is left. "
+                "Energy and work are compared "
                 "where all conditions walk equally fast, all else at the commanded speed. effects.csv tells the rest.",
                 *without,
             ]
