@@ -1,0 +1,133 @@
+"""Define nested classes of stiffness: constant, by phase, open loop, and a linear reflex on top of it.
+
+A class has a K of the ankle and of the toe for each part of its own stride, the same for both legs; a reflex besides
+multiplies the ankle's K by exp(sum of gain x error). The parts of a class divide those of the class before it, and
+gains may be 0, so that each class has every stiffness of the class before it, to the bit.
+"""
+
+from dataclasses import dataclass
+from math import ceil
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from springfoot.agents.policies import PolicyFunction, leg_phase
+from springfoot.arrays import NDArray
+from springfoot.envs.control import action_of
+from springfoot.envs.settings import BipedSettings, body_of, reference_gait
+from springfoot.envs.task import PERSON_OBSERVATION
+from springfoot.gait.body import TOE_STIFFNESS
+from springfoot.gait.springs import ankle_events, toe_events
+
+CENTRE = (250.0, TOE_STIFFNESS)
+"""Stiffness of ankle and toe [N m/rad] for 1.70 m and 63 kg at vectors of 0: chosen, with it the package's person walks
+1.20 m/s; people's toe."""
+LONGEST_PART = 0.1
+"""Longest part of the stride with one K in open loop; chosen: five decisions of 20 ms."""
+ERRORS = {"speed_error": 0.05, "com_x_error": 0.05, "com_z_error": 0.02}
+"""Entry of the observation that a reflex reads -> its size at which a gain of 1 multiplies K by e; chosen: 0.15 m/s,
+4.5 cm and 1.8 cm at 1.70 m."""
+_COLUMNS = [[entry.name for entry in PERSON_OBSERVATION].index(name) for name in ERRORS]
+_UNITS = np.array(list(ERRORS.values()))
+
+
+@dataclass(frozen=True, kw_only=True)
+class StiffnessClass:
+    """Class of stiffness, whose members are vectors (size,): ln K / `CENTRE` of the ankle's parts, of the toe's parts,
+    then the gains, by error and part."""
+
+    name: str
+    """Name in tables."""
+    ankle: tuple[float, ...] = (0.0,)
+    """Stride phases at which the parts with one K of the ankle begin, ascending from 0."""
+    toe: tuple[float, ...] = (0.0,)
+    """The same of the toe."""
+    gains: tuple[float, ...] = ()
+    """The same of the ankle's gains; empty without a reflex."""
+
+    @property
+    def size(self) -> int:
+        """Return the number of entries of a vector."""
+        return len(self.ankle) + len(self.toe) + len(ERRORS) * len(self.gains)
+
+    def split(self, vectors: ArrayLike) -> tuple[NDArray, NDArray, NDArray]:
+        """Return the parts of vectors (..., size): ankle (..., parts), toe (..., parts), gains (..., errors, parts)."""
+        vectors = np.asarray(vectors, float)
+        ankle, toe, gains = np.split(vectors, np.cumsum([len(self.ankle), len(self.toe)]), axis=-1)
+        return ankle, toe, gains.reshape(*vectors.shape[:-1], len(ERRORS), len(self.gains))
+
+    def policy(self, vectors: ArrayLike, settings: BipedSettings) -> PolicyFunction:
+        """Return the policy for N environments that sets in each the stiffness of its row of `vectors` (N, size).
+
+        K stays within the ranges of the settings.
+        """
+        ankle, toe, gains = self.split(vectors)
+        rows = np.arange(len(ankle))[:, None]
+        body = body_of(settings)
+        centre = np.array(CENTRE) * body.stiffness_scale
+
+        def act(observation: NDArray) -> NDArray:
+            """Return the actions (N, 4) at phases and errors of the observations (N, D)."""
+            phase = leg_phase(observation)  # (N, side)
+            logs = np.stack([ankle[rows, _part(self.ankle, phase)], toe[rows, _part(self.toe, phase)]], axis=-1)
+            if self.gains:
+                errors = observation[:, _COLUMNS] / _UNITS
+                of_phase = gains[rows, :, _part(self.gains, phase)]  # (N, side, error)
+                logs[..., 0] += (of_phase * errors[:, None]).sum(-1)
+            action = action_of(centre * np.exp(logs), settings, body)
+            return action.reshape(len(observation), -1).astype(np.float32)
+
+        return act
+
+    def stiffness(self, vector: ArrayLike, phase: NDArray) -> NDArray:
+        """Return ankle's and toe's K (n, 2) [N m/rad] of one vector at stride phases (n,), for 1.70 m and 63 kg and
+        without errors."""
+        ankle, toe, _ = self.split(vector)
+        return np.array(CENTRE) * np.exp(np.stack([ankle[_part(self.ankle, phase)], toe[_part(self.toe, phase)]], -1))
+
+
+def widened(vector: ArrayLike, inner: StiffnessClass, outer: StiffnessClass) -> NDArray:
+    """Return the vector of the class `outer` that has the same stiffness as `vector` of the class `inner` within it."""
+    ankle, toe, gains = inner.split(vector)
+    wide_gains = np.zeros((len(ERRORS), len(outer.gains)))
+    if inner.gains:
+        wide_gains = gains[:, _part(inner.gains, outer.gains)]
+    wide = ankle[_part(inner.ankle, outer.ankle)], toe[_part(inner.toe, outer.toe)], wide_gains.ravel()
+    return np.concatenate(wide)
+
+
+def nested_classes(settings: BipedSettings) -> tuple[StiffnessClass, ...]:
+    """Return the four classes, each within the next.
+
+    The phases are the thesis's: its events of ankle and toe, in the angles that the settings' body follows, part them.
+    """
+    gait = reference_gait(settings)
+    phase = np.linspace(0.0, gait.toe_off, 1001)
+    ankle = _starts(ankle_events(phase, gait.mean("ankle", phase), gait.toe_off))
+    toe = _starts(toe_events(phase, gait.mean("toe", phase), gait.toe_off))
+    finer = {"ankle": _divided(ankle), "toe": _divided(toe)}
+    return (
+        StiffnessClass(name="constant"),
+        StiffnessClass(name="per phase", ankle=ankle, toe=toe),
+        StiffnessClass(name="open loop", **finer),
+        StiffnessClass(name="linear reflex", **finer, gains=ankle),
+    )
+
+
+def _part(starts: ArrayLike, phase: ArrayLike) -> NDArray:
+    """Return the index of the part, of those that begin at `starts`, that holds at stride phases of any shape."""
+    return np.searchsorted(starts, phase, side="right") - 1
+
+
+def _starts(events: dict[str, float]) -> tuple[float, ...]:
+    """Return the distinct phases of events that begin with heel strike at 0."""
+    return tuple(sorted(set(events.values())))
+
+
+def _divided(starts: tuple[float, ...]) -> tuple[float, ...]:
+    """Return the starts of parts cut into equal ones of at most `LONGEST_PART`; those given are among them."""
+    finer = []
+    for begin, end in zip(starts, (*starts[1:], 1.0), strict=True):
+        pieces = ceil((end - begin) / LONGEST_PART - 1e-9)
+        finer += [begin + (end - begin) * piece / pieces for piece in range(pieces)]
+    return tuple(finer)

@@ -1,0 +1,107 @@
+"""The study of varying stiffness: planted differences and their intervals, falls, and a search that goes on."""
+
+import csv
+
+import numpy as np
+import pytest
+
+from springfoot.cli.main import study_main
+from springfoot.studies.springs.when import Link, compared, fewest_falls, links_table, verdict, visible
+
+NAMES = ("constant", "per phase")
+
+
+def walks(fibre, fell=(), speed=1.2):
+    """Return the numbers of episodes whose fibre work is given; those of index `fell` fall."""
+    return {
+        "fell": [index in fell for index in range(len(fibre))],
+        "fibre": list(fibre),
+        "likeness": [3.0] * len(fibre),
+        "speed_m_s": [speed] * len(fibre),
+    }
+
+
+def planted(difference, spread, episodes, seed):
+    """Return a link whose outer class costs `difference` more, episode by episode within `spread`; starts that both
+    share differ ten times as much."""
+    generator = np.random.default_rng(seed)
+    starts = generator.normal(4.0, 10.0 * spread, episodes)
+    outer = starts + difference + generator.normal(0.0, spread, episodes)
+    return compared("fibre", NAMES, "undisturbed", walks(starts), walks(outer))
+
+
+def test_intervals_cover_a_planted_difference_and_pairing_takes_the_starts_out():
+    links = [planted(-0.1, 0.1, 24, seed) for seed in range(200)]
+    covered = np.mean([link.low <= -0.1 <= link.high for link in links])
+    assert 0.89 <= covered <= 0.98  # a percentile bootstrap of 24 is a little short of 95 %
+    # Paired differences scatter by 0.1: an interval is some 4 x 0.1 / sqrt(24) wide; unpaired it would be ten times.
+    assert np.mean([link.high - link.low for link in links]) == pytest.approx(4 * 0.1 / np.sqrt(24), rel=0.1)
+
+
+def test_a_difference_of_the_smallest_visible_size_is_seen_four_times_in_five():
+    spread, episodes = 0.1, 24
+    size = (1.96 + 0.842) * spread / np.sqrt(episodes)
+    links = [planted(-size, spread, episodes, seed) for seed in range(200)]
+    assert np.mean([link.high < 0.0 for link in links]) == pytest.approx(0.8, abs=0.08)
+    assert np.mean([link.visible for link in links]) == pytest.approx(size, rel=0.05)
+    none = [planted(0.0, spread, episodes, seed) for seed in range(200)]
+    assert np.mean([link.high < 0.0 for link in none]) <= 0.07
+    assert visible(np.array([0.1])) is None
+
+
+def test_episodes_without_a_number_do_not_count_in_the_difference_but_in_the_falls():
+    link = compared("fibre", NAMES, "±300 N", walks([4.0, None, 4.2], fell=(1,)), walks([3.9, 3.0, 4.1]))
+    assert link.difference == pytest.approx(-0.1) and link.inner_mean == pytest.approx(4.1)
+    assert (link.inner_falls, link.outer_falls, link.episodes) == (1, 0, 3)
+    assert link.inner_falls_low < 1 / 3 < link.inner_falls_high
+    nobody = compared("fibre", NAMES, "±300 N", walks([None, None], fell=(0, 1)), walks([3.9, 3.0]))
+    assert (nobody.difference, nobody.inner_falls) == (None, 2)
+    assert "| – | – |" in links_table([nobody])
+
+
+def test_falls_differ_from_the_fewest_on_that_the_test_shows():
+    assert (fewest_falls(5), fewest_falls(6), fewest_falls(100)) == (None, 6, 6)  # 2 x (1/2)^6 < 0.05
+
+    def falls_of(alone):
+        """Return the sentence on falls if the inner class alone falls in so many of 16 episodes."""
+        level = planted(-1.0, 0.1, 16, 0)
+        inner, outer = walks([4.0] * 16, fell=range(alone)), walks([4.0] * 16)
+        return verdict([level, compared("fibre", NAMES, "±300 N", inner, outer)])
+
+    assert falls_of(5).endswith("Falls differ at no link.")
+    assert falls_of(6).endswith("Falls differ with per phase (fibre, ±300 N: 6 to 0 of 16).")
+
+
+def test_the_verdict_names_the_links_whose_interval_lies_below_0():
+    cheaper = planted(-1.0, 0.1, 16, 0)
+    same = planted(0.0, 0.1, 16, 1)
+    same = Link(**{**vars(same), "inner": "per phase", "outer": "open loop"})
+    text = verdict([cheaper, same])
+    assert "better than the class within: per phase -1.0" in text and "; not better: open loop." in text
+    assert verdict([same]).startswith("For fibre, undisturbed, none is better.")
+
+
+@pytest.mark.slow
+def test_a_quick_run_goes_on_from_what_it_kept(tmp_path, monkeypatch, capsys):
+    words = ["when", "--generations", "1", "--population", "2", "--episodes", "2", "--aims", "likeness"]
+    words += ["--pushes", "100", "--roughness", "0.01", "--seconds", "5.5", "--keep", str(tmp_path / "kept")]
+    assert study_main([*words, "--out", str(tmp_path / "first")]) == 0
+    assert len(list((tmp_path / "kept").iterdir())) == 1 + 7  # numbers, and the costs of seven searches
+    monkeypatch.setattr("springfoot.studies.springs.when._batch", None)  # walking again would fail
+    assert study_main([*words, "--out", str(tmp_path / "second")]) == 0
+    for name in ("links.csv", "stiffness.csv"):
+        assert (tmp_path / "first" / name).read_bytes() == (tmp_path / "second" / name).read_bytes()
+    rows = list(csv.DictReader((tmp_path / "first/links.csv").read_text().splitlines()))
+    assert [row["outer"] for row in rows[::3]] == ["per phase", "open loop", "linear reflex"]
+    assert {row["condition"] for row in rows} == {"undisturbed", "±100 N", "rough by 10 mm"}
+    assert "constant ⊂ per phase" in capsys.readouterr().out
+
+
+def test_bad_flags_are_one_line(tmp_path, capsys):
+    assert study_main(["when", "--pushes", "0"]) == 2
+    assert capsys.readouterr().err == (
+        "springfoot study when: error: pushes must be a finite number > 0 and <= 1000 N, got 0.0\n"
+    )
+    (tmp_path / "file").touch()
+    assert study_main(["when", "--keep", str(tmp_path / "file")]) == 2
+    assert "keep must be a folder" in capsys.readouterr().err
