@@ -11,7 +11,7 @@ episode. There are two aims, each with its own searches: least fibre work a metr
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache, partial
-from itertools import pairwise
+from itertools import pairwise, product
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, get_args
 
@@ -42,7 +42,7 @@ from .stiffness_classes import StiffnessClass, nested_classes, widened
 
 Aim = Literal["fibre", "likeness"]
 """Aim of a search: least fibre work a metre; least mean over joints of the angles' rms from people's mean."""
-UNITS: dict[str, str] = dict(zip(get_args(Aim), ("J/kg/m", "°"), strict=True))
+UNIT_OF_AIM: dict[str, str] = dict(zip(get_args(Aim), ("J/kg/m", "°"), strict=True))
 """Aim -> unit of its number."""
 FALL_COST = 4.0
 """Cost of a search if every episode falls, in the aim's unit; chosen: as much as the number itself."""
@@ -50,7 +50,7 @@ HELD_SPEED = 0.1
 """Difference from the commanded speed that costs as much as all falls, by its square [m/s]; chosen."""
 NO_WALK = 3 * FALL_COST
 """Cost of a stiffness with which no stride could be measured."""
-SPREAD = 0.2
+FIRST_SPREAD = 0.2
 """First spread of a search, in ln K and in gains; chosen."""
 CHOOSING = 4
 """Walks on which a search's result is held against its beginning; chosen."""
@@ -123,8 +123,8 @@ class Link:
 def compared(aim: str, names: tuple[str, str], condition: str, inner: Any, outer: Any) -> Link:
     """Return the link of two classes called `names` from their episodes.
 
-    `inner` and `outer` have, by name, lists of equal length: `fell`, `speed_m_s` and the aims of `UNITS`, None where
-    nothing could be measured.
+    `inner` and `outer` have, by name, lists of equal length: `fell`, `speed_m_s` and the number of each `Aim`, None
+    where nothing could be measured.
     """
     both = [index for index, pair in enumerate(zip(inner[aim], outer[aim], strict=True)) if None not in pair]
 
@@ -186,11 +186,11 @@ class When(WalkingStudy):
 
     person: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PERSON")] = "learned"
     """Policy that moves the person, and stays as it is: a run folder, a file, or `learned`."""
-    episodes: int = 16
+    episodes: int = 12
     """Episodes of each class and condition of the test."""
     seconds: float = 6.0
     """Length of each episode."""
-    generations: int = 12
+    generations: int = 10
     """Generations of each search."""
     population: int = 10
     """Candidates of each generation; each walks one episode, pushed."""
@@ -239,22 +239,20 @@ class When(WalkingStudy):
         if self.keep is not None:
             self.keep.mkdir(parents=True, exist_ok=True)
         kept = Kept(None if self.keep is None else self.keep / "numbers.json")
+        first, *_ = self._classes
+        best = {aim: self._search(kept, aim, first, np.zeros(first.size), first, progress) for aim in self.aims}
+        found = [(aim, first, best[aim]) for aim in self.aims]
         links = []
-        found: list[tuple[str, StiffnessClass, NDArray]] = []
-        for aim in self.aims:
-            first, *_ = self._classes
-            best = self._search(kept, aim, first, np.zeros(first.size), first, progress)
-            found.append((aim, first, best))
-            for inner, outer in pairwise(self._classes):
-                went_on = self._search(kept, aim, inner, best, outer, progress)
-                best = self._search(kept, aim, outer, widened(best, inner, outer), outer, progress)
-                found.append((aim, outer, best))
-                for condition in self._conditions:
-                    walks = [
-                        self._tested(kept, of_class, vector, condition, progress)
-                        for of_class, vector in ((inner, went_on), (outer, best))
-                    ]
-                    links.append(compared(aim, (inner.name, outer.name), condition.words, *walks))
+        for (inner, outer), aim in product(pairwise(self._classes), self.aims):
+            went_on = self._search(kept, aim, inner, best[aim], outer, progress)
+            best[aim] = self._search(kept, aim, outer, widened(best[aim], inner, outer), outer, progress)
+            found.append((aim, outer, best[aim]))
+            for condition in self._conditions:
+                walks = [
+                    self._tested(kept, of_class, vector, condition, progress)
+                    for of_class, vector in ((inner, went_on), (outer, best[aim]))
+                ]
+                links.append(compared(aim, (inner.name, outer.name), condition.words, *walks))
         files = {
             "links.csv": csv_text(list(asdict(links[0])), [list(asdict(link).values()) for link in links]),
             "stiffness.csv": _stiffness_csv(found),
@@ -279,7 +277,7 @@ class When(WalkingStudy):
             return self._costs(aim, of_class, vectors, self.seed + generation, 1, progress)
 
         options = {"popsize": self.population, "seed": self.seed + 1, "verbose": -9}
-        strategy = cma.CMAEvolutionStrategy(start, SPREAD, options)
+        strategy = cma.CMAEvolutionStrategy(start, FIRST_SPREAD, options)
         question = [*self._asked, aim, of_class.name, link.name, start.tolist()]
         name = f"{aim}-{link.name}-{of_class.name}.json".replace(" ", "-")
         file = None if self.keep is None else self.keep / name
@@ -399,7 +397,7 @@ class When(WalkingStudy):
     @property
     def _asked(self) -> list[Any]:
         """Return what all costs and numbers depend on, as plain JSON values."""
-        return [self._person, self.seconds, self.seed, self.population, self.pushes[0]]
+        return [self.person, self.seconds, self.seed, self.population, self.pushes[0]]
 
 
 @lru_cache(maxsize=8)
@@ -423,13 +421,13 @@ def _episode(recording: Recording, index: int) -> Recording:
 
 
 def numbers_of(recording: Recording) -> dict[str, Any]:
-    """Return speed and the numbers of `UNITS` of a recording, from its metrics; None of all if one is missing."""
+    """Return speed and the number of each `Aim` of a recording, from its metrics; None of all if one is missing."""
     metrics = measure(recording).metrics
     angles = [metrics["joints"][joint]["rmse_deg"] for joint in COMPARED_JOINTS]
     fibre = metrics["effort"]["fibre_J_kg_m"]
     speed = metrics["speed_m_s"]["mean"]
     if None in (*angles, fibre, speed):
-        return {"speed_m_s": None, **dict.fromkeys(UNITS)}
+        return {"speed_m_s": None, **dict.fromkeys(UNIT_OF_AIM)}
     return {"speed_m_s": speed, "fibre": fibre, "likeness": float(np.mean(angles))}
 
 
@@ -441,7 +439,7 @@ def verdict(links: Sequence[Link]) -> str:
         here = [link for link in links if link.aim == aim and link.condition == Condition().words]
         seen = [link for link in here if link.high is not None and link.high < 0.0]
         gains = [
-            f"{link.outer} {link.difference:+.3f} [{link.low:.3f}, {link.high:.3f}] {UNITS[aim]} "
+            f"{link.outer} {link.difference:+.3f} [{link.low:.3f}, {link.high:.3f}] {UNIT_OF_AIM[aim]} "
             f"({100 * link.difference / link.inner_mean:+.1f} %)"
             for link in seen
             if link.difference is not None and link.inner_mean is not None
@@ -468,7 +466,7 @@ def links_table(links: Sequence[Link]) -> str:
         level = here[conditions[0]]
         falls = [f"{here[name].inner_falls}, {here[name].outer_falls} of {here[name].episodes}" for name in conditions]
         lines.append([" ⊂ ".join(names), _number(level.inner_mean), _difference(level), *falls])
-    unit = UNITS[links[0].aim]
+    unit = UNIT_OF_AIM[links[0].aim]
     return table(["classes", f"inner, {unit}", f"outer less inner, {unit}", *conditions], lines)
 
 

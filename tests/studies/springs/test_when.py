@@ -31,7 +31,7 @@ def planted(difference, spread, episodes, seed):
 
 
 def test_intervals_cover_a_planted_difference_and_pairing_takes_the_starts_out():
-    links = [planted(-0.1, 0.1, 24, seed) for seed in range(200)]
+    links = [planted(-0.1, 0.1, 24, seed) for seed in range(100)]
     covered = np.mean([link.low <= -0.1 <= link.high for link in links])
     assert 0.89 <= covered <= 0.98  # a percentile bootstrap of 24 is a little short of 95 %
     # Paired differences scatter by 0.1: an interval is some 4 x 0.1 / sqrt(24) wide; unpaired it would be ten times.
@@ -41,10 +41,10 @@ def test_intervals_cover_a_planted_difference_and_pairing_takes_the_starts_out()
 def test_a_difference_of_the_smallest_visible_size_is_seen_four_times_in_five():
     spread, episodes = 0.1, 24
     size = (1.96 + 0.842) * spread / np.sqrt(episodes)
-    links = [planted(-size, spread, episodes, seed) for seed in range(200)]
+    links = [planted(-size, spread, episodes, seed) for seed in range(100)]
     assert np.mean([link.high < 0.0 for link in links]) == pytest.approx(0.8, abs=0.08)
     assert np.mean([link.visible for link in links]) == pytest.approx(size, rel=0.05)
-    none = [planted(0.0, spread, episodes, seed) for seed in range(200)]
+    none = [planted(0.0, spread, episodes, seed) for seed in range(100)]
     assert np.mean([link.high < 0.0 for link in none]) <= 0.07
     assert visible(np.array([0.1])) is None
 
