@@ -93,7 +93,7 @@ class Link:
     episodes: int
     """Number of episodes."""
     inner_mean: float | None
-    """Aim's number with the inner class, mean of the episodes in which both walk; None without any."""
+    """Aim's number with the inner class, mean of the episodes in which both walk to the end; None without any."""
     difference: float | None
     """Outer less inner, mean of the same episodes; negative where the outer is better."""
     low: float | None
@@ -126,10 +126,14 @@ def compared(aim: str, names: tuple[str, str], condition: str, inner: Any, outer
     `inner` and `outer` have, by name, lists of equal length: `fell`, `speed_m_s` and the number of each `Aim`, None
     where nothing could be measured.
     """
-    both = [index for index, pair in enumerate(zip(inner[aim], outer[aim], strict=True)) if None not in pair]
+    both = [
+        index
+        for index, pair in enumerate(zip(inner[aim], outer[aim], strict=True))
+        if None not in pair and not (inner["fell"][index] or outer["fell"][index])
+    ]
 
     def values(walks: Any, name: str) -> NDArray:
-        """Return the numbers of the episodes in which both walk, (n,)."""
+        """Return the numbers of the episodes in which both walk to the end, (n,)."""
         return np.array([walks[name][index] for index in both], float)
 
     numbers: dict[str, float | None] = dict.fromkeys(

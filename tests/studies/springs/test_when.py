@@ -49,8 +49,8 @@ def test_a_difference_of_the_smallest_visible_size_is_seen_four_times_in_five():
     assert visible(np.array([0.1])) is None
 
 
-def test_episodes_without_a_number_do_not_count_in_the_difference_but_in_the_falls():
-    link = compared("fibre", NAMES, "±300 N", walks([4.0, None, 4.2], fell=(1,)), walks([3.9, 3.0, 4.1]))
+def test_episodes_that_fall_do_not_count_in_the_difference_but_in_the_falls():
+    link = compared("fibre", NAMES, "±300 N", walks([4.0, 9.0, 4.2], fell=(1,)), walks([3.9, 3.0, 4.1]))
     assert link.difference == pytest.approx(-0.1) and link.inner_mean == pytest.approx(4.1)
     assert (link.inner_falls, link.outer_falls, link.episodes) == (1, 0, 3)
     assert link.inner_falls_low < 1 / 3 < link.inner_falls_high
@@ -82,7 +82,14 @@ def test_the_verdict_names_the_links_whose_interval_lies_below_0():
 
 
 @pytest.mark.slow
-def test_a_quick_run_goes_on_from_what_it_kept(tmp_path, monkeypatch, capsys):
+def test_quick_has_every_link(tmp_path, capsys):
+    assert study_main(["when", "--quick", "--out", str(tmp_path / "out")]) == 0
+    assert "open loop ⊂ linear reflex" in capsys.readouterr().out
+    assert (tmp_path / "out/stiffness.png").stat().st_size > 0
+
+
+@pytest.mark.slow
+def test_kept_costs_and_numbers_are_not_walked_again(tmp_path, monkeypatch, capsys):
     words = ["when", "--generations", "1", "--population", "2", "--episodes", "2", "--aims", "likeness"]
     words += ["--pushes", "100", "--roughness", "0.01", "--seconds", "5.5", "--keep", str(tmp_path / "kept")]
     assert study_main([*words, "--out", str(tmp_path / "first")]) == 0
