@@ -168,8 +168,8 @@ def compared(aim: str, names: tuple[str, str], condition: str, inner: Any, outer
 
 def visible(differences: NDArray) -> float | None:
     """Return the smallest mean that paired differences (n,) of this spread show with the chance `POWER`: the sum of the
-    two normal quantiles times the standard error. None for a single one."""
-    if len(differences) < 2:
+    two normal quantiles times the standard error. None for a single one, and where both walk the same."""
+    if len(differences) < 2 or not differences.any():
         return None
     error = np.std(differences, ddof=1) / np.sqrt(len(differences))
     return float((norm.ppf(0.5 + LEVEL / 2) + norm.ppf(POWER)) * error)
@@ -378,7 +378,8 @@ class When(WalkingStudy):
                 f"episodes), and in brackets the smallest difference seen with a chance of {100 * POWER:g} %. Falls of "
                 f"inner, outer: episodes in which one alone falls show a difference {seen} (McNemar). Each search "
                 f"walks {self.generations} × {self.population} candidates, pushed by ±{self.pushes[0]:g} N. A reflex "
-                "plus a network is left out.",
+                "plus a network is left out. A difference of exactly 0: no search of the link found better than its start, "
+                "which says little of what a longer one would find.",
             ]
         )
 

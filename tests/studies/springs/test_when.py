@@ -52,7 +52,7 @@ def test_a_difference_of_the_smallest_visible_size_is_seen_four_times_in_five():
     assert np.mean([link.visible or 0.0 for link in links]) == pytest.approx(size, rel=0.05)
     none = [planted(0.0, spread, episodes, seed) for seed in range(100)]
     assert np.mean([interval(link)[1] < 0.0 for link in none]) <= 0.07
-    assert visible(np.array([0.1])) is None
+    assert visible(np.array([0.1])) is None and visible(np.zeros(12)) is None
 
 
 def test_episodes_that_fall_do_not_count_in_the_difference_but_in_the_falls():
