@@ -378,8 +378,8 @@ class When(WalkingStudy):
                 f"episodes), and in brackets the smallest difference seen with a chance of {100 * POWER:g} %. Falls of "
                 f"inner, outer: episodes in which one alone falls show a difference {seen} (McNemar). Each search "
                 f"walks {self.generations} × {self.population} candidates, pushed by ±{self.pushes[0]:g} N. A reflex "
-                "plus a network is left out. A difference of exactly 0: no search of the link found better than its start, "
-                "which says little of what a longer one would find.",
+                "plus a network is left out. A difference of exactly 0: no search of the link found better than its "
+                "start, which says little of what a longer one would find.",
             ]
         )
 
