@@ -246,5 +246,9 @@ def configured(preset: TrainingConfig, training: dict[str, Any], environment: di
 
     `training` holds settings of the training, `environment` those of the environment, both by name.
     """
+    if "reward_weights" in environment:  # the others stay the preset's
+        environment = environment | {
+            "reward_weights": preset.environment.reward_weights | environment["reward_weights"]
+        }
     settings = settings_from(**settings_to_json(preset.environment) | environment)
     return dataclasses.replace(preset, **training, environment=settings)

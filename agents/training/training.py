@@ -70,8 +70,8 @@ def resume(
             None finishes an interrupted run.
         threads: threads of the physics in place of the saved number; results are the same with any.
         callbacks: as for `train`; their state is not part of the checkpoint.
-        reward_weights: weights of the reward from here on, in place of the saved ones. The best policy is measured
-            anew by them, and the session in `run.json` keeps the saved ones as `changed_from`.
+        reward_weights: weights of the reward from here on, in place of the saved ones of the same names. The best
+            policy is measured anew by them, and the session in `run.json` keeps the saved ones as `changed_from`.
 
     Starts from the newest whole checkpoint, and ends with the bits of an uninterrupted run, on the same versions and a
     processor of the same instructions. Completes whatever an earlier end left unfinished in the folder. Raises
@@ -97,7 +97,8 @@ def resume(
         done = header["timesteps"]
         config = config_from_json(record["config"])
         if reward_weights is not None:
-            settings = settings_to_json(config.environment) | {"reward_weights": dict(reward_weights)}
+            weights = config.environment.reward_weights | dict(reward_weights)
+            settings = settings_to_json(config.environment) | {"reward_weights": weights}
             config = dataclasses.replace(config, environment=settings_from(**settings))
         total = config.timesteps if timesteps is None else done + timesteps
         if total <= done and checkpoint and _is_complete(out, record, checkpoint):

@@ -116,6 +116,13 @@ def test_flags_take_the_place_of_the_preset():
     assert train_command.configured(PRESETS["any-body"], {}, {"height_range": None}).environment.height_range is None
 
 
+def test_given_weights_leave_the_others_of_the_preset():
+    preset = PRESETS["person"]
+    weights = train_command.configured(preset, {}, {"reward_weights": {"pose": 1.0}}).environment.reward_weights
+    assert weights == preset.environment.reward_weights | {"pose": 1.0}
+    assert weights["fibre_work"] == -2.0
+
+
 def test_human_names_a_file_one_of_its_conditions_or_several_files(tmp_path):
     rows = [f"{percent},{10 + percent % 100 / 2},{name}" for name in ("slow", "fast") for percent in range(101)]
     (tmp_path / "mean.csv").write_text("\n".join(["percent,knee_flexion_deg,condition", *rows]))
