@@ -31,7 +31,7 @@ def planted(name, number_of, falls=(), episodes=3):
     """Rows of an experiment's walks, each walking as commanded, whose numbers are 1 but for those of `number_of`, a
     function of condition, commanded speed and episode; the episodes (condition, episode) of `falls` fall."""
     rows = []
-    for condition, given in walks_of(EXPERIMENTS[name]):
+    for condition, given in walks_of(WALKED[name]):
         for episode in range(episodes):
             numbers = dict.fromkeys(EFFECT_NUMBERS, 1.0) | {"walked_m_s": given["speed"]}
             numbers |= number_of(condition, given["speed"], episode)
