@@ -249,23 +249,8 @@ def _path_by_integration(
     position = weights @ x
     velocity = weights @ v
     acceleration = squared_rate(t) * (position - np.interp(t, zmp_times, zmp_points)) - back
-    return _quintics(t, position, velocity, acceleration)
-
-
-def _quintics(t: NDArray, x: NDArray, v: NDArray, a: NDArray) -> PPoly:
-    """Return the quintics between times `t` (T,) that have position, velocity and acceleration (T,) at them.
-
-    They are those of `BPoly.from_derivatives`, which takes a third of the time of a plan as it loops over intervals.
-    """
-    duration = np.diff(t)
-    # Bernstein coefficients, from both ends inward.
-    first = x[:-1]
-    second = v[:-1] / 5 * duration + first
-    third = a[:-1] / 20 * duration**2 - first + 2 * second
-    last = x[1:]
-    fifth = last - v[1:] / 5 * duration
-    fourth = a[1:] / 20 * duration**2 + 2 * fifth - last
-    return PPoly.from_bernstein_basis(BPoly(np.stack([first, second, third, fourth, fifth, last]), t))
+    quintics = BPoly.from_derivatives(t, np.stack([position, velocity, acceleration], -1))
+    return PPoly.from_bernstein_basis(quintics)
 
 
 def _path_by_matrices(
@@ -323,4 +308,8 @@ def _path_by_matrices(
     x = state[:, 0]
     v = state[:, 1]
     a = (matrices @ state[..., None])[:, 1, 0]
-    return _quintics(t, x, v, a)
+    duration = np.diff(t)
+    # Quintics by position, velocity and acceleration at their ends, as Bernstein coefficients.
+    bernstein = [x[:-1], x[:-1] + duration * v[:-1] / 5, x[:-1] + 2 * duration * v[:-1] / 5 + duration**2 * a[:-1] / 20]
+    bernstein += [x[1:] - 2 * duration * v[1:] / 5 + duration**2 * a[1:] / 20, x[1:] - duration * v[1:] / 5, x[1:]]
+    return PPoly.from_bernstein_basis(BPoly(np.stack(bernstein), t))
