@@ -70,7 +70,13 @@ def test_ground_gives_nothing_in_any_committed_walk(policy, given):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("policy", "given"),
-    [("pretrained", {}), ("predicted", {}), ("schedule", {}), ("schedule", {"right_foot": "rigid_toe"})],
+    [
+        ("pretrained", {}),
+        ("medium", {}),
+        ("predicted", {}),
+        ("schedule", {}),
+        ("schedule", {"right_foot": "rigid_toe"}),
+    ],
     ids=str,
 )
 def test_half_the_physics_step_gives_the_same_walk(policy, given):
