@@ -1,14 +1,17 @@
 """Find the styles of `gait/plan/least_work.json`: CMA-ES on plans, without a simulation and without people's curves.
 
-    springfoot study plan-tuning --speed 1.2
+    springfoot study plan-tuning --speeds 1.2
+    springfoot study plan-tuning --speeds 0.8 1.2 1.6
 
 A plan has people's step length and time at its speed. The search chooses everything else by the least effort of the
 plan's inverse dynamics (`springfoot.gait.plan.effort`), with the swing foot clear of the floor and joints within their
-range. It starts at round numbers.
+range. It starts at round numbers. At several speeds it finds one style that changes linearly with speed: plans of least
+effort differ much at nearly the same price, so separate searches would add their luck to what changes with speed.
 """
 
 import json
 from dataclasses import dataclass, fields
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
@@ -18,7 +21,7 @@ import tyro
 from tqdm import tqdm
 
 from springfoot.arrays import NDArray
-from springfoot.errors import SpringfootError, require_count, require_number
+from springfoot.errors import SpringfootError, quoted, require_count, require_number, require_within
 from springfoot.files.writing import csv_text, write_atomically
 from springfoot.gait.body import HEEL_RADIUS, Body
 from springfoot.gait.people import human_gait
@@ -37,6 +40,7 @@ from springfoot.gait.plan import (
     plan_walk,
     style_from,
 )
+from springfoot.gait.plan.plan import PLAN_SPEED_RANGE
 
 from ..base.study import Answer, OnProgress, Study
 from .cma_search import asked_of, generations
@@ -154,10 +158,11 @@ def price(
 
 @dataclass(frozen=True, kw_only=True)
 class PlanTuning(Study):
-    """Find the plan of least effort by CMA-ES, and write it into a file of styles."""
+    """Find the plans of least effort by CMA-ES, and write their styles into a file."""
 
-    speed: float = 1.2
-    """Speed [m/s] at 1.70 m."""
+    speeds: tuple[float, ...] = (1.2,)
+    """Speeds [m/s] at 1.70 m, ascending. The search prices plans at all of them by their mean; styles are found for the
+    first and the last, and are linear in speed in between."""
     generations: int = 200
     """Generations of the search."""
     population: int = 20
@@ -185,7 +190,7 @@ class PlanTuning(Study):
     UNIT: ClassVar[str] = " generations"
 
     def check(self) -> None:
-        """Refuse counts out of range."""
+        """Refuse counts out of range, and speeds that do not ascend."""
         for count, least in (("generations", 1), ("population", 4), ("seed", 0)):
             require_count(count, getattr(self, count), least)
         require_number("sigma", self.sigma, 0, above=True)
@@ -193,55 +198,83 @@ class PlanTuning(Study):
             require_number(name, getattr(self, name), 0)
         for weight in self.weights:
             require_number("weights", weight, 0)
+        for speed in self.speeds:
+            require_within("speeds", speed, PLAN_SPEED_RANGE, "m/s")
+        if not self.speeds or any(faster <= slower for slower, faster in pairwise(self.speeds)):
+            raise SpringfootError(f"speeds must be one or more ascending numbers, got {quoted(list(self.speeds))}")
 
     @property
     def total(self) -> float:
         """Return the number of generations."""
         return self.generations
 
+    @property
+    def found_speeds(self) -> tuple[float, ...]:
+        """Return the speeds whose styles the search finds [m/s]: the first and the last."""
+        return tuple(dict.fromkeys((self.speeds[0], self.speeds[-1])))
+
     def ask(self, progress: OnProgress) -> Answer:
-        """Search, and write the style."""
+        """Search, and write the styles."""
         body = Body()
         options = {"popsize": self.population, "seed": self.seed + 1, "verbose": -9}
-        begin = np.zeros(len(CHOICES)) if self.start is None else vector_of(least_work(self.speed, self.start))
-        strategy = cma.CMAEvolutionStrategy(begin, self.sigma, options)
+        begin = np.zeros((len(self.found_speeds), len(CHOICES)))
+        if self.start is not None:
+            begin = np.stack([vector_of(least_work(speed, self.start)) for speed in self.found_speeds])
+        strategy = cma.CMAEvolutionStrategy(begin.ravel(), self.sigma, options)
         lines = []
         best_cost = np.inf
-        best_vector = begin
+        best = begin.ravel()
 
-        def costs_of(_: int, vectors: list[NDArray]) -> NDArray:
+        def costs_of(_: int, candidates: list[NDArray]) -> NDArray:
             """Return the costs of a generation's candidates."""
-            return np.array([self._price(body, vector)[0] for vector in vectors])
+            return np.array([self._mean_price(body, candidate) for candidate in candidates])
 
         for generation, vectors, costs in generations(strategy, self.generations, costs_of, self.log, asked_of(self)):
             if costs.min() < best_cost:
                 best_cost = float(costs.min())
-                best_vector = vectors[int(np.argmin(costs))]
+                best = vectors[int(np.argmin(costs))]
             lines.append([generation + 1, float(costs.min()), float(np.median(costs))])
             progress(1)
             if generation % 10 == 9:
                 tqdm.write(f"generation {generation + 1}: best {lines[-1][1]:.4f}, median {lines[-1][2]:.4f}")
-        cost, plan, effort = self._price(body, best_vector)
-        style = style_at(best_vector)
-        self._write_style(style)
-        text = f"{json.dumps(style.to_json())}\n\npaid {cost:.4f}: {effort}"
-        if plan is not None:
-            human = human_gait(self.speed)
-            columns = {"people": numbers_of(human, human), "the plan": numbers_of(gait_of(plan), human)}
-            text += f"\n\n{prediction_table(columns, ('the plan',))}"
-        return Answer(text=text, files={"generations.csv": csv_text(["generation", "best", "median"], lines)})
+        styles = {speed: style_at(self._vector_at(best, speed)) for speed in self.found_speeds}
+        self._write_styles(styles)
+        parts = [f"{speed:g} m/s: {json.dumps(style.to_json())}" for speed, style in styles.items()]
+        for speed in self.speeds:
+            cost, plan, effort = self._price(body, speed, self._vector_at(best, speed))
+            parts.append(f"{speed:g} m/s: paid {cost:.4f}: {effort}")
+            if plan is not None:
+                human = human_gait(speed)
+                columns = {"people": numbers_of(human, human), "the plan": numbers_of(gait_of(plan), human)}
+                parts.append(prediction_table(columns, ("the plan",)))
+        return Answer(
+            text="\n\n".join(parts), files={"generations.csv": csv_text(["generation", "best", "median"], lines)}
+        )
 
-    def _price(self, body: Body, vector: NDArray) -> tuple[float, WalkPlan | None, Effort | None]:
+    def _vector_at(self, candidate: NDArray, speed: float) -> NDArray:
+        """Return the vector of the style at `speed` [m/s] of a candidate, which holds those of `found_speeds`."""
+        ends = candidate.reshape(len(self.found_speeds), -1)
+        if len(ends) == 1:
+            return ends[0]
+        slowest, fastest = self.found_speeds
+        return ends[0] + (speed - slowest) / (fastest - slowest) * (ends[1] - ends[0])
+
+    def _mean_price(self, body: Body, candidate: NDArray) -> float:
+        """Return the mean cost of a candidate over the speeds (see `price`)."""
+        return float(np.mean([self._price(body, speed, self._vector_at(candidate, speed))[0] for speed in self.speeds]))
+
+    def _price(self, body: Body, speed: float, vector: NDArray) -> tuple[float, WalkPlan | None, Effort | None]:
         """Return cost, plan and effort at a vector, by the flags (see `price`)."""
         muscle = Muscle(tissue=self.tissue, tendon=self.tendon, toe_tendon=self.toe_tendon)
-        return price(body, self.speed, vector, self.weights, muscle)
+        return price(body, speed, vector, self.weights, muscle)
 
-    def _write_style(self, style: WalkStyle) -> None:
-        """Write the style that was found, and the command that found it, into the file of styles in place of that of
-        this speed; with --quick nothing."""
+    def _write_styles(self, styles: dict[float, WalkStyle]) -> None:
+        """Write the styles that were found, and the command that found them, into the file of styles in place of those
+        of these speeds; with --quick nothing."""
         if self.quick:
             return
         table = read_styles(self.styles)
-        table["styles"][f"{self.speed:g}"] = style.to_json()
-        table["found_by"][f"{self.speed:g}"] = self.command
+        for speed, style in styles.items():
+            table["styles"][f"{speed:g}"] = style.to_json()
+            table["found_by"][f"{speed:g}"] = self.command
         write_atomically(self.styles, (json.dumps(table, indent=1) + "\n").encode())

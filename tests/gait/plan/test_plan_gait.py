@@ -1,5 +1,6 @@
 """A plan as a gait, its effort, and the committed style of least effort."""
 
+import re
 from dataclasses import replace
 from math import sqrt
 
@@ -7,13 +8,14 @@ import numpy as np
 import pytest
 
 from springfoot.cli.main import main
+from springfoot.errors import SpringfootError
 from springfoot.gait import Body, plan_walk, planned_moments
 from springfoot.gait.body.body import GRAVITY
 from springfoot.gait.body.tissue import passive_moments
 from springfoot.gait.plan.effort import MOTION_RANGE_DEG, Muscle, effort_of
 from springfoot.gait.plan.plan_gait import gait_of
-from springfoot.gait.plan.walk_style import least_work, style_from
-from springfoot.studies.searches.plan_tuning import CHOICES, price, style_at, vector_of
+from springfoot.gait.plan.walk_style import STYLES, least_work, style_from
+from springfoot.studies.searches.plan_tuning import CHOICES, PlanTuning, price, style_at, vector_of
 
 PHASE = np.arange(200) / 200
 BODY = Body()
@@ -79,6 +81,23 @@ def test_the_search_runs_and_leaves_the_file_alone_with_quick(tmp_path, capsys):
     assert main(["study", "plan-tuning", "--quick", "--styles", str(styles), "--out", str(tmp_path / "out")]) == 0
     assert "paid" in capsys.readouterr().out and not styles.exists()
     assert (tmp_path / "out" / "generations.csv").is_file()
+
+
+def test_a_search_at_several_speeds_finds_one_style_linear_in_speed(tmp_path):
+    styles = tmp_path / "styles.json"
+    search = PlanTuning(speeds=(0.9, 1.2, 1.5), generations=2, population=4, sigma=0.02, start=STYLES, styles=styles)
+    text = search.ask(lambda _: None).text
+    slow, middle, fast = (vector_of(least_work(speed, styles)) for speed in search.speeds)
+    assert np.abs(fast - slow).max() > 0.01 and middle == pytest.approx(0.5 * (slow + fast), abs=1e-3)
+    for speed, vector in zip(search.speeds, (slow, middle, fast), strict=True):
+        told = re.search(rf"^{speed:g} m/s: paid ([0-9.]+):", text, re.MULTILINE)
+        assert told and float(told[1]) == pytest.approx(price(BODY, speed, vector)[0], abs=0.02)
+
+
+@pytest.mark.parametrize("speeds", [(1.2, 0.9), (1.2, 1.2), ()])
+def test_speeds_of_a_search_ascend(speeds):
+    with pytest.raises(SpringfootError, match="speeds must be one or more ascending numbers"):
+        PlanTuning(speeds=speeds).check()
 
 
 def test_passive_moments_are_those_of_the_source():
