@@ -85,6 +85,7 @@ STUDIES = {
         "With which stiffness of ankles and toes does a person walk, fall, and take least?",
     ),
     "effects": ("walks.effects.Effects", "Does a person change as people did in laboratories, in sign and size?"),
+    "changes": ("walks.changes.Changes", "Does a walk change with speed as people's does?"),
     "when": ("springs.when.When", "What does it buy to vary ankle and toe stiffness within the step? (searches)"),
     "orthosis": ("feet.orthosis.Orthosis", "Which spring beside the ankles helps weak calves?"),
     "prosthesis": ("feet.prosthesis.Prosthesis", "Which stiffness of a passive prosthetic ankle takes least?"),

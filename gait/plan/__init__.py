@@ -6,7 +6,7 @@ from springfoot.lazy import lazy_names
 
 if TYPE_CHECKING:
     from .effort import ACTIVATION_TIME, AS_IS, PER_DEGREE, PRICES, Effort, Muscle, effort_of, effort_of_stride
-    from .plan import Cadence, WalkPlan, plan_walk
+    from .plan import PLAN_SPEED_RANGE, Cadence, WalkPlan, plan_walk
     from .plan_gait import gait_of
     from .walk_style import STYLES, WalkStyle, least_work, style_from
 
@@ -14,6 +14,7 @@ __all__ = [
     "ACTIVATION_TIME",
     "AS_IS",
     "PER_DEGREE",
+    "PLAN_SPEED_RANGE",
     "PRICES",
     "STYLES",
     "Cadence",
@@ -36,6 +37,7 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
             "ACTIVATION_TIME": "effort",
             "AS_IS": "effort",
             "PER_DEGREE": "effort",
+            "PLAN_SPEED_RANGE": "plan",
             "PRICES": "effort",
             "STYLES": "walk_style",
             "Cadence": "plan",

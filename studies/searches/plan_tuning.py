@@ -28,6 +28,7 @@ from springfoot.gait.people import human_gait
 from springfoot.gait.plan import (
     AS_IS,
     PER_DEGREE,
+    PLAN_SPEED_RANGE,
     PRICES,
     STYLES,
     Effort,
@@ -40,7 +41,6 @@ from springfoot.gait.plan import (
     plan_walk,
     style_from,
 )
-from springfoot.gait.plan.plan import PLAN_SPEED_RANGE
 
 from ..base.study import Answer, OnProgress, Study
 from .cma_search import asked_of, generations
