@@ -16,6 +16,7 @@ if TYPE_CHECKING:
         record,
         record_each,
         record_feet,
+        record_policies,
         record_walk,
     )
 
@@ -31,6 +32,7 @@ __all__ = [
     "record",
     "record_each",
     "record_feet",
+    "record_policies",
     "record_walk",
 ]
 
@@ -49,6 +51,7 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
             "record": "recording",
             "record_each": "recording",
             "record_feet": "recording",
+            "record_policies": "recording",
             "record_walk": "recording",
         },
     )

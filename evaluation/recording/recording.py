@@ -106,6 +106,18 @@ class Recording:
         standing = np.flatnonzero(self.fall_reason == "")
         return int(standing[0]) if len(standing) else int(np.argmax(self.ticks))
 
+    def of_episode(self, index: int) -> "Recording":
+        """Return the recording of one episode alone, with its seed."""
+        alone = slice(index, index + 1)
+        return replace(
+            self,
+            seed=self.seed + index,
+            ticks=self.ticks[alone],
+            returns=self.returns[alone],
+            fall_reason=self.fall_reason[alone],
+            series={name: values[alone] for name, values in self.series.items()},
+        )
+
     def shown(self) -> dict[str, NDArray]:
         """Return name -> (T, ...) float64 series of the `example`, without the samples after its end."""
         episode = self.example
@@ -265,6 +277,48 @@ def record_feet(
         rows = slice(index * episodes, (index + 1) * episodes)
         recordings.append(Recording(policy=name, settings=on_feet, seed=seed, **kept.of(rows), **course))
     return recordings
+
+
+def record_policies(
+    policies: Mapping[str, PolicyFunction],
+    settings: BipedSettings,
+    *,
+    episodes: int = 20,
+    seed: int = 0,
+    threads: int = 2,
+    progress: Callable[[float], object] = lambda seconds: None,
+) -> list[Recording]:
+    """Record, as `record` does, the same episodes with each of several `policies`, by name, side by side.
+
+    Returns a recording for each. The policies must decide on each environment by itself, whatever stands beside it.
+    """
+    course: dict[str, Any] = planned_course(reference_walk_at(settings, settings.speed).plan)
+    seeds = range(seed, seed + episodes)
+    names = list(policies)
+    together = max(1, BATCH // episodes)  # policies in a batch
+    recordings = []
+    for first in range(0, len(names), together):
+        batch = names[first : first + together]
+        act = _side_by_side([policies[name] for name in batch])
+        kept = record_all(act, settings, [*seeds] * len(batch), threads=threads, progress=progress)
+        for index, name in enumerate(batch):
+            rows = slice(index * episodes, (index + 1) * episodes)
+            recordings.append(Recording(policy=name, settings=settings, seed=seed, **kept.of(rows), **course))
+    return recordings
+
+
+def _side_by_side(policies: Sequence[PolicyFunction]) -> PolicyFunction:
+    """Return the policy that acts as each of several in its own environments: equally many, one policy after
+    another."""
+    if len(policies) == 1:
+        return policies[0]
+
+    def act(observation: NDArray) -> NDArray:
+        """Return the actions (N, D) of each policy on its rows of the observations (N, ...)."""
+        own = np.split(observation, len(policies))
+        return np.concatenate([policy(rows) for policy, rows in zip(policies, own, strict=True)])
+
+    return act
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -1,7 +1,7 @@
 """Compute intervals of means and fractions, and a test of two policies' falls in the same episodes."""
 
 import numpy as np
-from scipy.stats import binomtest, bootstrap
+from scipy.stats import binomtest, bootstrap, norm
 
 from springfoot.arrays import NDArray
 
@@ -9,6 +9,8 @@ RESAMPLES = 10_000
 """Resamples of the bootstrap."""
 LEVEL = 0.95
 """Confidence level of every interval."""
+POWER = 0.8
+"""Chance with which the smallest visible difference is seen."""
 
 
 def mean_interval(values: NDArray, level: float = LEVEL) -> tuple[float, float]:
@@ -29,6 +31,15 @@ def mean_interval(values: NDArray, level: float = LEVEL) -> tuple[float, float]:
         rng=np.random.default_rng(0),
     )
     return float(result.confidence_interval.low), float(result.confidence_interval.high)
+
+
+def visible(differences: NDArray) -> float | None:
+    """Return the smallest mean that paired differences (n,) of this spread show with the chance `POWER`: the sum of the
+    two normal quantiles times the standard error. None for a single one, and where both walk the same."""
+    if len(differences) < 2 or not differences.any():
+        return None
+    error = np.std(differences, ddof=1) / np.sqrt(len(differences))
+    return float((norm.ppf(0.5 + LEVEL / 2) + norm.ppf(POWER)) * error)
 
 
 def share_interval(count: int, total: int, level: float = LEVEL) -> tuple[float, float]:

@@ -1,7 +1,7 @@
 """Keep a study's results in a file, so that a stopped study goes on without computing them again."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -26,10 +26,21 @@ class Kept:
 
     def get(self, question: Any, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
         """Return the kept result for `question`, any JSON value; call `make` for it and keep it if there is none."""
-        text = json.dumps(question, sort_keys=True)
-        if text not in self._known:
-            self._known[text] = make()
+        (result,) = self.get_all([question], lambda _: [make()])
+        return result
+
+    def get_all(
+        self, questions: Sequence[Any], make: Callable[[list[int]], Sequence[dict[str, Any]]]
+    ) -> list[dict[str, Any]]:
+        """Return the kept result for each of several questions; `make` those that are missing together, and keep them.
+
+        `make` returns the results for the indices of questions that it is called with.
+        """
+        texts = [json.dumps(question, sort_keys=True) for question in questions]
+        missing = [index for index, text in enumerate(texts) if text not in self._known]
+        if missing:
+            self._known |= zip([texts[index] for index in missing], make(missing), strict=True)
             if self._path is not None:
                 self._path.parent.mkdir(parents=True, exist_ok=True)
                 write_atomically(self._path, (json.dumps(self._known, indent=1) + "\n").encode())
-        return self._known[text]
+        return [self._known[text] for text in texts]

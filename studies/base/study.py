@@ -143,3 +143,25 @@ class WalkingStudy(Study):
     def what_ran(self) -> str:
         """Return number, length and seeds of each row's episodes, in words."""
         return f"{self.episodes} episodes × {self.seconds:g} s, seeds {self.seed}–{self.seed + self.episodes - 1}"
+
+    @property
+    def walked(self) -> dict[str, Any]:
+        """Return what flags decide of each walk, as JSON values, with which its numbers are kept; threads decide
+        nothing."""
+        return {**self.how, "threads": 0}
+
+
+@dataclass(frozen=True, kw_only=True)
+class PersonsStudy(WalkingStudy):
+    """A study that walks learned persons, and keeps the numbers of each walk."""
+
+    persons: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="PERSON ...")] = ("learned",)
+    """Policies that move the person: run folders, files, or `learned`."""
+    episodes: int = 5
+    """Episodes of each condition and commanded speed."""
+    seconds: float = 12.0
+    """Length of each episode."""
+    keep: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    """File in which the numbers of each walk are kept, to go on after a stop."""
+
+    QUICK: ClassVar[Mapping[str, Any]] = {"episodes": 1, "seconds": 6.0, "keep": None}

@@ -11,6 +11,7 @@ like a large saving. Conditions are compared where all walk equally fast (`walke
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
+from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -19,29 +20,24 @@ import tyro
 from springfoot.envs import BipedSettings
 from springfoot.envs.settings import body_of
 from springfoot.evaluation.numbers import measure
-from springfoot.evaluation.recording import policy_and_settings, record
+from springfoot.evaluation.recording import Recording
 from springfoot.files.markdown import MISSING, table, text_of
 
+from ..base.kept import Kept
 from ..base.study import Answer, OnProgress, WalkingStudy
-from .walked_speeds import TWO_PRICES, Row, at_walked_speeds, lowest, rows_csv
+from .both_feet import both, braced
+from .condition_walks import ConditionWalks
+from .walked_speeds import TWO_PRICES, Row, at_walked_speeds, lowest, price_numbers, rows_csv
 
 ASKED_SPEEDS = (0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6)
 """Commanded speeds [m/s]."""
 WALKED_SPEEDS = (0.8, 1.0, 1.2)
 """Walked speeds at which prices are compared [m/s]."""
+CONTROL_PRICES = (*TWO_PRICES, "net_joint_J_kg_m")
+"""Columns of prices in the table of walks; the last is the old price."""
 UNCHANGED = "sound"
 STIFFEST = "500 N·m/rad, right ankle"
 """The condition whose spring once "saved" 13 %, when net joint work was the price."""
-
-
-def _brace(**numbers: Any) -> dict[str, Any]:
-    """Return a sound foot with an orthosis at its ankle."""
-    return {"kind": "intact", "orthosis": numbers}
-
-
-def _both(foot: dict[str, Any]) -> dict[str, Any]:
-    """Return the setting of both feet."""
-    return {"left_foot": foot, "right_foot": foot}
 
 
 BOTH_ANKLES = (0.0, 50.0, 100.0, 150.0, 250.0, 350.0, 500.0)
@@ -76,31 +72,29 @@ TRIED_SPRINGS = (
     Springs(
         name="both ankles",
         against=UNCHANGED,
-        settings={k: _both(_brace(ankle_stiffness=k)) for k in BOTH_ANKLES},
+        settings={k: both(braced(ankle_stiffness=k)) for k in BOTH_ANKLES},
     ),
     Springs(
         name=f"both ankles, {DEVICE_KG:g} kg each",
         against=f"slack, both ankles, {DEVICE_KG:g} kg each",  # like with like: the mass without a spring
-        settings={k: _both(_brace(ankle_stiffness=k) | WITH_MASS) for k in BOTH_ANKLES},
+        settings={k: both(braced(ankle_stiffness=k) | WITH_MASS) for k in BOTH_ANKLES},
     ),
     Springs(
         name="both ankles, one-way",
         against="slack, both ankles, one-way",
-        settings={
-            k: _both(_brace(ankle_stiffness=k, ankle_deg=-5.73, engages="dorsiflexion")) for k in BOTH_ANKLES[:5]
-        },
+        settings={k: both(braced(ankle_stiffness=k, ankle_deg=-5.73, engages="dorsiflexion")) for k in BOTH_ANKLES[:5]},
     ),
 )
 """Springs whose best stiffness and saving are told."""
 CONTROLS: dict[str, Mapping[str, Any]] = {
     UNCHANGED: {},
     **{springs.conditions[k]: given for springs in TRIED_SPRINGS for k, given in springs.settings.items()},
-    STIFFEST: {"right_foot": _brace(ankle_stiffness=500.0)},
-    "feet of twice the mass": _both({"kind": "intact", "foot_mass_ratio": 2.0, "foot_inertia_ratio": 2.0}),
+    STIFFEST: {"right_foot": braced(ankle_stiffness=500.0)},
+    "feet of twice the mass": both({"kind": "intact", "foot_mass_ratio": 2.0, "foot_inertia_ratio": 2.0}),
     "20 % of body weight on the back": {"carried_ratio": 0.2},
     "slope +2°": {"slope_deg": 2.0},
     "slope −2°": {"slope_deg": -2.0},
-    "both calves of 25 %": _both({"kind": "weak", "strength": 0.25}),
+    "both calves of 25 %": both({"kind": "weak", "strength": 0.25}),
     "right toe locked": {"right_foot": "rigid_toe"},
     "rigid right foot": {"right_foot": "rigid"},
     "passive right foot, 400 N·m/rad": {"right_foot": {"kind": "passive", "ankle_stiffness": 400.0}},
@@ -118,8 +112,10 @@ class Controls(WalkingStudy):
     """Length of each episode."""
     policies: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="POLICY ...")] = ("schedule",)
     """Policies to walk with; the schedule of stiffness reacts to nothing."""
+    keep: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
+    """File in which the numbers of each walk are kept, to go on after a stop."""
 
-    QUICK: ClassVar[Mapping[str, Any]] = {"episodes": 1, "seconds": 6.0}
+    QUICK: ClassVar[Mapping[str, Any]] = {"episodes": 1, "seconds": 6.0, "keep": None}
 
     @property
     def total(self) -> float:
@@ -128,16 +124,15 @@ class Controls(WalkingStudy):
 
     def ask(self, progress: OnProgress) -> Answer:
         """Walk with every policy under every condition."""
+        asked = [
+            (name, speed, {**given, "speed": speed}) for name, given in CONTROLS.items() for speed in self._asked()
+        ]
         walks = [
-            {
-                "policy": policy,
-                "condition": name,
-                "speed_m_s": speed,
-                **self.walk(policy, {**given, "speed": speed}, progress),
-            }
+            {"policy": policy, "condition": name, "speed_m_s": speed, **numbers}
             for policy in self.policies
-            for name, given in CONTROLS.items()
-            for speed in self._asked()
+            for (name, speed, _), numbers in zip(
+                asked, self.walk(policy, [given for _, _, given in asked], progress), strict=True
+            )
         ]
         even = at_walked_speeds(walks, ("policy", "condition"), (0.9,) if self.quick else WALKED_SPEEDS)
         best = best_springs(even)
@@ -146,23 +141,21 @@ class Controls(WalkingStudy):
         return Answer(text=f"{controls_table(even)}\n\n{best_table(best)}\n\n{how}", files=files)
 
     def walk(
-        self, policy: str, given: Mapping[str, Any], progress: OnProgress = lambda seconds: None
-    ) -> dict[str, float | None]:
-        """Return the share of episodes that fall, walked speed and prices of one condition at one commanded speed; None
-        where they cannot be measured."""
-        act, settings = policy_and_settings(policy, {**given, "episode_seconds": self.seconds})
-        metrics = measure(record(act, settings, name=policy, progress=progress, **self.how)).metrics
-        effort = metrics["effort"]
-        return {
-            "falls": metrics["falls"] / metrics["episodes"],
-            "walked_m_s": metrics["speed_m_s"]["mean"],
-            "fibre_J_kg_m": effort["fibre_J_kg_m"],
-            "effort": effort["total"],
-            "net_joint_J_kg_m": effort["net_joint_J_kg_m"],
-        }
+        self, policy: str, conditions: Sequence[Mapping[str, Any]], progress: OnProgress = lambda seconds: None
+    ) -> list[dict[str, float | None]]:
+        """Return, for each of several conditions, the share of episodes that fall, walked speed and prices; None where
+        they cannot be measured."""
+        under = ConditionWalks(study=self, measured=_prices_of, names=CONTROL_PRICES, kept=Kept(self.keep))
+        return under.walk(policy, conditions, progress)
 
     def _asked(self) -> Sequence[float]:
         return (0.8, 1.0, 1.2) if self.quick else ASKED_SPEEDS
+
+
+def _prices_of(recording: Recording) -> dict[str, float | None]:
+    """Return the numbers of a walk, by `CONTROL_PRICES`."""
+    metrics = measure(recording).metrics
+    return price_numbers(metrics) | {CONTROL_PRICES[-1]: metrics["effort"]["net_joint_J_kg_m"]}
 
 
 def _prices(even: Sequence[Row]) -> dict[tuple[str, str, float], Row]:

@@ -24,12 +24,8 @@ from springfoot.files.markdown import MISSING, table
 from ..base.kept import Kept
 from ..base.study import Answer, OnProgress, WalkingStudy
 from .foot_numbers import FOOT_NUMBERS, numbers_of
-from .walked_speeds import TWO_PRICES, Row, at_walked_speeds, lowest, rows_csv
+from .walked_speeds import ASKED_SPEEDS, TWO_PRICES, WALKED_SPEEDS, Row, at_walked_speeds, lowest, rows_csv
 
-ASKED_SPEEDS = (0.8, 1.0, 1.2, 1.4, 1.6)
-"""Commanded speeds [m/s]."""
-WALKED_SPEEDS = (0.9, 1.1, 1.3)
-"""Walked speeds at which springs are compared [m/s]."""
 COLORS = ("#0b6e8f", "#c26a1b", "#7a5195", "#4a8f3c", "#555555")
 
 

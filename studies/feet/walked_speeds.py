@@ -8,9 +8,24 @@ import numpy as np
 
 from springfoot.files.writing import csv_text
 
+ASKED_SPEEDS = (0.8, 1.0, 1.2, 1.4, 1.6)
+"""Commanded speeds [m/s]."""
+WALKED_SPEEDS = (0.9, 1.1, 1.3)
+"""Walked speeds at which walks are compared [m/s]."""
 Row = Mapping[str, Any]
 TWO_PRICES = ("fibre_J_kg_m", "effort")
 """Columns of the two prices of a walk: fibre work, and all of the effort."""
+
+
+def price_numbers(metrics: Mapping[str, Any]) -> dict[str, float | None]:
+    """Return the share of episodes that fall, walked speed [m/s] and both prices of a walk, from its metrics; None
+    where they cannot be measured."""
+    return {
+        "falls": metrics["falls"] / metrics["episodes"],
+        "walked_m_s": metrics["speed_m_s"]["mean"],
+        TWO_PRICES[0]: metrics["effort"]["fibre_J_kg_m"],
+        TWO_PRICES[1]: metrics["effort"]["total"],
+    }
 
 
 def at_walked_speeds(

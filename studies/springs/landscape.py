@@ -12,34 +12,29 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise, product
 from pathlib import Path
-from typing import Annotated, Any, ClassVar
+from typing import Any
 
 import matplotlib
 import numpy as np
-import tyro
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from springfoot.agents.policies import find_policy
 from springfoot.errors import require_number
 from springfoot.evaluation.numbers import measure
-from springfoot.evaluation.recording import policy_and_settings, record
+from springfoot.evaluation.recording import policy_and_settings, record_policies
 from springfoot.evaluation.report import STYLE
 from springfoot.files.markdown import MISSING, table
 
 from ..base.columns import COMPARED_JOINTS
 from ..base.kept import Kept
-from ..base.study import Answer, OnProgress, WalkingStudy
-from ..feet.walked_speeds import TWO_PRICES, Row, at_walked_speeds, rows_csv
+from ..base.study import Answer, OnProgress, PersonsStudy
+from ..feet.walked_speeds import ASKED_SPEEDS, TWO_PRICES, WALKED_SPEEDS, Row, at_walked_speeds, price_numbers, rows_csv
 
 ANKLES = (50.0, 100.0, 150.0, 200.0, 300.0, 400.0)
 """Stiffness of both ankles [N m/rad] for 1.70 m and 63 kg, up to the tendon's in series."""
 TOES = (7.0, 14.0, 28.0, 56.0, 84.0)
 """Stiffness of both toes [N m/rad], a quarter to three times that of toes in people."""
-ASKED_SPEEDS = (0.8, 1.0, 1.2, 1.4, 1.6)
-"""Commanded speeds [m/s]."""
-WALKED_SPEEDS = (0.9, 1.1, 1.3)
-"""Walked speeds at which prices are compared [m/s]."""
 NOT_DEARER = 0.05
 """Share by which a price may exceed the least one and not be told apart from it; as `told_apart.GAP` of feet."""
 BOTH_STIFFNESSES = ("ankle_N_m_rad", "toe_N_m_rad")
@@ -47,21 +42,11 @@ BOTH_STIFFNESSES = ("ankle_N_m_rad", "toe_N_m_rad")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Landscape(WalkingStudy):
+class Landscape(PersonsStudy):
     """Walk persons over a grid of ankle and toe stiffness, the same over the stride, at five speeds."""
 
-    persons: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="PERSON ...")] = ("learned",)
-    """Policies that move the person: run folders, files, or `learned`."""
-    episodes: int = 5
-    """Episodes of each cell, and as many pushed."""
-    seconds: float = 12.0
-    """Length of each episode."""
     push_newton: float = 100.0
     """Size of the pushes [N]."""
-    keep: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """File in which the numbers of each cell are kept, to go on after a stop."""
-
-    QUICK: ClassVar[Mapping[str, Any]] = {"episodes": 1, "seconds": 6.0, "keep": None}
 
     def check(self) -> None:
         """Refuse counts, lengths and pushes out of range."""
@@ -76,11 +61,17 @@ class Landscape(WalkingStudy):
     def ask(self, progress: OnProgress) -> Answer:
         """Walk every person in every cell."""
         kept = Kept(self.keep)
-        walks = []
-        for person, (ankle, toe, speed) in product(self.persons, self._cells()):
-            cell = dict(zip(BOTH_STIFFNESSES, (ankle, toe), strict=True))
-            numbers = self._walk(kept, person, f"constant:{ankle:g},{toe:g}", speed, progress)
-            walks.append({"person": person, **cell, "speed_m_s": speed, **numbers})
+        cells = {(ankle, toe): f"constant:{ankle:g},{toe:g}" for ankle, toe, _ in self._cells()}
+        speeds = dict.fromkeys(speed for _, _, speed in self._cells())
+        numbers: dict[tuple[Any, ...], dict[str, Any]] = {}
+        for person, speed in product(self.persons, speeds):
+            of_cells = self._walk(kept, person, list(cells.values()), speed, progress)
+            numbers |= {(person, *cell, speed): own for cell, own in zip(cells, of_cells, strict=True)}
+        walks = [
+            {"person": person, **dict(zip(BOTH_STIFFNESSES, cell, strict=True)), "speed_m_s": speed}
+            | numbers[person, *cell, speed]
+            for person, (*cell, speed) in product(self.persons, self._cells())
+        ]
         even = at_walked_speeds(walks, ("person", *BOTH_STIFFNESSES), (0.9,) if self.quick else WALKED_SPEEDS)
         least = cheapest(even)
         files = {
@@ -91,28 +82,27 @@ class Landscape(WalkingStudy):
         }
         return Answer(text=self._text(walks, least), files=files)
 
-    def _walk(self, kept: Kept, person: str, policy: str, speed: float, progress: OnProgress) -> dict[str, Any]:
-        """Return the numbers of one cell."""
+    def _walk(
+        self, kept: Kept, person: str, cells: Sequence[str], speed: float, progress: OnProgress
+    ) -> list[dict[str, Any]]:
+        """Return the numbers of several cells at a commanded speed; `cells` are policies that keep their stiffness."""
         given = {"person": str(find_policy(person)), "speed": speed, "episode_seconds": self.seconds}
 
-        def walked(push: float) -> dict[str, Any]:
-            """Return the metrics of the walks pushed by so much."""
-            act, settings = policy_and_settings(policy, {**given, "push_newton": push})
-            return measure(record(act, settings, name=policy, progress=progress, **self.how)).metrics
+        def walked(chosen: Sequence[str], push: float) -> list[dict[str, Any]]:
+            """Return the metrics of the walks of the `chosen` cells, side by side, pushed by so much."""
+            found = {name: policy_and_settings(name, {**given, "push_newton": push}) for name in chosen}
+            acts = {name: act for name, (act, _) in found.items()}
+            _, settings = found[chosen[0]]
+            recordings = record_policies(acts, settings, progress=progress, **self.how)
+            return [measure(recording).metrics for recording in recordings]
 
-        def make() -> dict[str, Any]:
+        def make(missing: list[int]) -> list[dict[str, Any]]:
             """Walk undisturbed and pushed; return the numbers."""
-            metrics = walked(0.0)
-            return {
-                "falls": metrics["falls"] / metrics["episodes"],
-                "falls_pushed": walked(self.push_newton)["falls"] / self.episodes,
-                "walked_m_s": metrics["speed_m_s"]["mean"],
-                TWO_PRICES[0]: metrics["effort"]["fibre_J_kg_m"],
-                TWO_PRICES[1]: metrics["effort"]["total"],
-                **{f"{joint}_rmse_deg": metrics["joints"][joint]["rmse_deg"] for joint in COMPARED_JOINTS},
-            }
+            chosen = [cells[index] for index in missing]
+            pairs = zip(walked(chosen, 0.0), walked(chosen, self.push_newton), strict=True)
+            return [_numbers(metrics, pushed) for metrics, pushed in pairs]
 
-        return kept.get([{**self.how, "threads": 0}, self.push_newton, policy, given], make)
+        return kept.get_all([[self.walked, self.push_newton, cell, given] for cell in cells], make)
 
     def _cells(self) -> Sequence[tuple[float, float, float]]:
         """Return ankle, toe and commanded speed of each cell."""
@@ -138,6 +128,17 @@ class Landscape(WalkingStudy):
                 f"the cells that cost at most {100 * NOT_DEARER:g} % more than the least.",
             ]
         )
+
+
+def _numbers(metrics: Mapping[str, Any], pushed: Mapping[str, Any]) -> dict[str, float | None]:
+    """Return the numbers of a cell from the metrics of its walks, undisturbed and pushed."""
+    numbers = price_numbers(metrics)
+    return {
+        "falls": numbers["falls"],
+        "falls_pushed": price_numbers(pushed)["falls"],
+        **numbers,
+        **{f"{joint}_rmse_deg": metrics["joints"][joint]["rmse_deg"] for joint in COMPARED_JOINTS},
+    }
 
 
 def _fallen(walks: Sequence[Row], column: str) -> int:

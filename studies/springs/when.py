@@ -9,18 +9,17 @@ episode. There are two aims, each with its own searches: least fibre work a metr
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from functools import lru_cache, partial
 from itertools import pairwise, product
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple, get_args
+from typing import Annotated, Any, ClassVar, NamedTuple, get_args
 
 import cma
 import matplotlib
 import numpy as np
 import tyro
 from matplotlib.figure import Figure
-from scipy.stats import norm
 
 from springfoot.agents.policies import find_policy
 from springfoot.arrays import NDArray
@@ -30,20 +29,16 @@ from springfoot.errors import MOST_COUNT, SpringfootError, require_count, requir
 from springfoot.evaluation.numbers import measure
 from springfoot.evaluation.recording import Episodes, Recording, planned_course, policy_and_settings, record_walk
 from springfoot.evaluation.report import STYLE
-from springfoot.files.markdown import MISSING, table
 from springfoot.files.writing import csv_text
 
 from ..base.columns import COMPARED_JOINTS
-from ..base.intervals import LEVEL, mean_interval, paired_p, share_interval
+from ..base.intervals import POWER
 from ..base.kept import Kept
 from ..base.study import Answer, OnProgress, WalkingStudy
 from ..searches.cma_search import generations
+from .links import UNDISTURBED_WALK, UNIT_OF_AIM, Aim, Link, compared, fewest_falls, links_table, verdict
 from .stiffness_classes import StiffnessClass, nested_classes, widened
 
-Aim = Literal["fibre", "likeness"]
-"""Aim of a search: least fibre work a metre; least mean over joints of the angles' rms from people's mean."""
-UNIT_OF_AIM: dict[str, str] = dict(zip(get_args(Aim), ("J/kg/m", "°"), strict=True))
-"""Aim -> unit of its number."""
 FALL_COST = 4.0
 """Cost of a search if every episode falls, in the aim's unit; chosen: as much as the number itself."""
 HELD_SPEED = 0.1
@@ -56,8 +51,6 @@ CHOOSING = 4
 """Walks on which a search's result is held against its beginning; chosen."""
 TEST_SEED = 500_000
 """Difference of the first seed of the test from the first one of the searches."""
-POWER = 0.8
-"""Chance with which the smallest visible difference is seen."""
 PHASES = np.arange(200) / 200
 """Stride phases of the picture and of its table."""
 
@@ -75,113 +68,7 @@ class Condition(NamedTuple):
         """Return the condition in words."""
         if self.push_newton:
             return f"±{self.push_newton:g} N"
-        return f"rough by {1000 * self.unevenness_m:g} mm" if self.unevenness_m else "undisturbed"
-
-
-@dataclass(frozen=True, kw_only=True)
-class Link:
-    """Comparison of an outer class with the inner one on the same episodes, for one aim and condition."""
-
-    aim: str
-    """Aim of both searches."""
-    inner: str
-    """Name of the inner class."""
-    outer: str
-    """Name of the outer class."""
-    condition: str
-    """Condition in words."""
-    episodes: int
-    """Number of episodes."""
-    inner_mean: float | None
-    """Aim's number with the inner class, mean of the episodes in which both walk to the end; None without any."""
-    difference: float | None
-    """Outer less inner, mean of the same episodes; negative where the outer is better."""
-    low: float | None
-    """Lower end of its 95 % interval."""
-    high: float | None
-    """Upper end."""
-    visible: float | None
-    """Smallest difference that such an interval sees with the chance `POWER`; None for a single episode."""
-    speed_m_s: float | None
-    """Mean speed of the inner class [m/s]."""
-    speed_difference_m_s: float | None
-    """Outer less inner [m/s]."""
-    inner_falls: int
-    """Episodes in which the inner class falls."""
-    inner_falls_low: float
-    """Lower end of the 95 % interval of its share of falls [0..1]."""
-    inner_falls_high: float
-    """Upper end."""
-    outer_falls: int
-    """The same of the outer class."""
-    outer_falls_low: float
-    outer_falls_high: float
-    falls_p: float
-    """p of McNemar's exact test that both fall equally often."""
-
-
-def compared(aim: str, names: tuple[str, str], condition: str, inner: Any, outer: Any) -> Link:
-    """Return the link of two classes called `names` from their episodes.
-
-    `inner` and `outer` have, by name, lists of equal length: `fell`, `speed_m_s` and the number of each `Aim`, None
-    where nothing could be measured.
-    """
-    both = [
-        index
-        for index, pair in enumerate(zip(inner[aim], outer[aim], strict=True))
-        if None not in pair and not (inner["fell"][index] or outer["fell"][index])
-    ]
-
-    def values(walks: Any, name: str) -> NDArray:
-        """Return the numbers of the episodes in which both walk to the end, (n,)."""
-        return np.array([walks[name][index] for index in both], float)
-
-    numbers: dict[str, float | None] = dict.fromkeys(
-        ("inner_mean", "difference", "low", "high", "visible", "speed_m_s", "speed_difference_m_s")
-    )
-    if both:
-        difference = values(outer, aim) - values(inner, aim)
-        numbers |= zip(("low", "high"), mean_interval(difference), strict=True)
-        numbers |= {
-            "inner_mean": float(values(inner, aim).mean()),
-            "difference": float(difference.mean()),
-            "visible": visible(difference),
-            "speed_m_s": float(values(inner, "speed_m_s").mean()),
-            "speed_difference_m_s": float((values(outer, "speed_m_s") - values(inner, "speed_m_s")).mean()),
-        }
-    falls: dict[str, Any] = {}
-    fell = {"inner": np.array(inner["fell"], bool), "outer": np.array(outer["fell"], bool)}
-    for name, those in fell.items():
-        low, high = share_interval(int(those.sum()), len(those))
-        falls |= {f"{name}_falls": int(those.sum()), f"{name}_falls_low": low, f"{name}_falls_high": high}
-    return Link(
-        aim=aim,
-        inner=names[0],
-        outer=names[1],
-        condition=condition,
-        episodes=len(fell["inner"]),
-        falls_p=paired_p(fell["inner"], fell["outer"]),
-        **numbers,
-        **falls,
-    )
-
-
-def visible(differences: NDArray) -> float | None:
-    """Return the smallest mean that paired differences (n,) of this spread show with the chance `POWER`: the sum of the
-    two normal quantiles times the standard error. None for a single one, and where both walk the same."""
-    if len(differences) < 2 or not differences.any():
-        return None
-    error = np.std(differences, ddof=1) / np.sqrt(len(differences))
-    return float((norm.ppf(0.5 + LEVEL / 2) + norm.ppf(POWER)) * error)
-
-
-def fewest_falls(episodes: int) -> int | None:
-    """Return the fewest falls of one class alone that McNemar's test shows in so many episodes; None if none do."""
-    for alone in range(1, episodes + 1):
-        fell = np.arange(episodes) < alone
-        if paired_p(fell, np.zeros(episodes, bool)) < 1.0 - LEVEL:
-            return alone
-    return None
+        return f"rough by {1000 * self.unevenness_m:g} mm" if self.unevenness_m else UNDISTURBED_WALK
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -326,7 +213,7 @@ class When(WalkingStudy):
         def make() -> dict[str, Any]:
             """Walk; return the numbers of each episode."""
             (walked,) = self._walk(of_class, [vector], self.seed + TEST_SEED, self.episodes, condition, progress)
-            rows = [numbers_of(_episode(walked, index)) for index in range(self.episodes)]
+            rows = [numbers_of(walked.of_episode(index)) for index in range(self.episodes)]
             return {
                 "fell": (walked.fall_reason != "").tolist(),
                 **{name: [row[name] for row in rows] for name in rows[0]},
@@ -413,18 +300,6 @@ def _batch(person: str, seconds: float, condition: Condition, count: int, thread
     return Biped(settings, count, threads)
 
 
-def _episode(recording: Recording, index: int) -> Recording:
-    """Return the recording of one episode alone."""
-    rows = slice(index, index + 1)
-    return replace(
-        recording,
-        ticks=recording.ticks[rows],
-        returns=recording.returns[rows],
-        fall_reason=recording.fall_reason[rows],
-        series={name: values[rows] for name, values in recording.series.items()},
-    )
-
-
 def numbers_of(recording: Recording) -> dict[str, Any]:
     """Return speed and the number of each `Aim` of a recording, from its metrics; None of all if one is missing."""
     metrics = measure(recording).metrics
@@ -434,58 +309,6 @@ def numbers_of(recording: Recording) -> dict[str, Any]:
     if None in (*angles, fibre, speed):
         return {"speed_m_s": None, **dict.fromkeys(UNIT_OF_AIM)}
     return {"speed_m_s": speed, "fibre": fibre, "likeness": float(np.mean(angles))}
-
-
-def verdict(links: Sequence[Link]) -> str:
-    """Return, in sentences, at which links the outer class is better undisturbed, aim by aim, and at which falls
-    differ."""
-    sentences = []
-    for aim in dict.fromkeys(link.aim for link in links):
-        here = [link for link in links if link.aim == aim and link.condition == Condition().words]
-        seen = [link for link in here if link.high is not None and link.high < 0.0]
-        gains = [
-            f"{link.outer} {link.difference:+.3f} [{link.low:.3f}, {link.high:.3f}] {UNIT_OF_AIM[aim]} "
-            f"({100 * link.difference / link.inner_mean:+.1f} %)"
-            for link in seen
-            if link.difference is not None and link.inner_mean is not None
-        ]
-        others = [link.outer for link in here if link not in seen]
-        better = f"better than the class within: {', '.join(gains)}" if gains else "none is better"
-        rest = f"; not better: {', '.join(others)}" if gains and others else ""
-        sentences.append(f"For {aim}, undisturbed, {better}{rest}.")
-    fewer = [
-        f"{link.outer} ({link.aim}, {link.condition}: {link.inner_falls} to {link.outer_falls} of {link.episodes})"
-        for link in links
-        if link.falls_p < 1.0 - LEVEL
-    ]
-    sentences.append(f"Falls differ {'with ' + ', '.join(fewer) if fewer else 'at no link'}.")
-    return " ".join(sentences)
-
-
-def links_table(links: Sequence[Link]) -> str:
-    """Return the Markdown table of one aim's links, a line each, with a column of falls for each condition."""
-    conditions = list(dict.fromkeys(link.condition for link in links))
-    lines = []
-    for names in dict.fromkeys((link.inner, link.outer) for link in links):
-        here = {link.condition: link for link in links if (link.inner, link.outer) == names}
-        level = here[conditions[0]]
-        falls = [f"{here[name].inner_falls}, {here[name].outer_falls} of {here[name].episodes}" for name in conditions]
-        lines.append([" ⊂ ".join(names), _number(level.inner_mean), _difference(level), *falls])
-    unit = UNIT_OF_AIM[links[0].aim]
-    return table(["classes", f"inner, {unit}", f"outer less inner, {unit}", *conditions], lines)
-
-
-def _number(value: float | None) -> str:
-    """Return a number of an aim as text."""
-    return MISSING if value is None else f"{value:.2f}"
-
-
-def _difference(link: Link) -> str:
-    """Return the difference of a link with its interval and the smallest visible one as text."""
-    if link.difference is None:
-        return MISSING
-    seen = MISSING if link.visible is None else f"{link.visible:.3f}"
-    return f"{link.difference:+.3f} [{link.low:+.3f}, {link.high:+.3f}] ({seen})"
 
 
 def _stiffness_csv(found: Sequence[tuple[str, StiffnessClass, NDArray]]) -> str:

@@ -11,7 +11,6 @@ from math import degrees
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from springfoot.arrays import NDArray
 from springfoot.envs import BipedSettings
@@ -19,12 +18,10 @@ from springfoot.envs.physics import JOINTS
 from springfoot.envs.settings import body_of
 from springfoot.gait.body import TOE_STIFFNESS
 
+from ..feet.both_feet import both, braced
+from .condition_effects import Effect, Measured, change, difference, mean_of, per_unit, slope
 from .effect_numbers import FIBRE
 
-Measured = Mapping[Any, Mapping[str, NDArray]]
-"""Condition -> number -> its value in each of E episodes (E,), NaN where it is unknown."""
-Effect = Callable[[Measured], NDArray]
-"""Function that returns an effect in each episode (E,)."""
 _SOUND = "sound"
 LOCKED_TOE = 1000.0
 """Stiffness of a passive foot's toe that is called locked, the largest [N m/rad]."""
@@ -54,50 +51,7 @@ class Experiment:
     """What departs from the configuration, and what is derived."""
 
 
-# Effects from measured numbers --------------------------------------------------------------------------------
-
-
-def difference(name: str, of: Any, against: Any) -> Effect:
-    """Return the effect: a number in one condition less that in another."""
-    return lambda measured: measured[of][name] - measured[against][name]
-
-
-def change(name: str, of: Any, against: Any) -> Effect:
-    """Return the effect: the change of a number from one condition to another [%]."""
-    return lambda measured: 100.0 * (measured[of][name] / measured[against][name] - 1.0)
-
-
-def per_unit(name: str, at: Mapping[Any, float], factor: float = 1.0) -> Effect:
-    """Return the effect: the slope of `factor` times a number over conditions, each `at` a place."""
-    return lambda measured: factor * slope(list(at.values()), [measured[key][name] for key in at])
-
-
-def slope(places: ArrayLike, values: ArrayLike) -> NDArray:
-    """Return the slopes (E,) of the lines of least squares through C conditions' `values` (C, E) over `places`, (C,) or
-    (C, E)."""
-    y = np.asarray(values)
-    x = np.asarray(places)
-    x = np.broadcast_to(x[:, None] if x.ndim == 1 else x, y.shape)
-    x = x - x.mean(0)
-    return (x * y).sum(0) / (x * x).sum(0)
-
-
-def mean_of(effects: Mapping[str, Effect]) -> Effect:
-    """Return the effect: the mean of several."""
-    return lambda measured: np.mean([effect(measured) for effect in effects.values()], axis=0)
-
-
 # Conditions ---------------------------------------------------------------------------------------------------
-
-
-def _both(foot: Any) -> dict[str, Any]:
-    """Return the setting of both feet."""
-    return {"left_foot": foot, "right_foot": foot}
-
-
-def _brace(**numbers: Any) -> dict[str, Any]:
-    """Return a sound foot with an orthosis."""
-    return {"kind": "intact", "orthosis": numbers}
 
 
 def _passive(toe: float) -> dict[str, Any]:
@@ -110,25 +64,24 @@ STRENGTHS = (0.2, 0.3)
 BRACES = (160.0, 233.0, 305.0, 378.0)
 """Stiffness of braces on weak calves, 2.8 to 6.6 N m/deg [N m/rad]."""
 _WEAK = {
-    (strength, k): _both({"kind": "weak", "strength": strength, "orthosis": {"ankle_stiffness": k, "ankle_deg": 0.0}})
+    (strength, k): both({"kind": "weak", "strength": strength, "orthosis": {"ankle_stiffness": k, "ankle_deg": 0.0}})
     for strength in STRENGTHS
     for k in BRACES
 }
 _EXO = {
-    k: _both(_brace(ankle_stiffness=k, ankle_deg=-5.7, engages="dorsiflexion"))
-    for k in (0.0, 50.0, 100.0, 150.0, 250.0)
+    k: both(braced(ankle_stiffness=k, ankle_deg=-5.7, engages="dorsiflexion")) for k in (0.0, 50.0, 100.0, 150.0, 250.0)
 }
 _TOE = {"locked": _passive(LOCKED_TOE), "flexible": _passive(60.0)}
-_STIFF = {1.0: {}} | {factor: _both(_brace(toe_stiffness=(factor - 1.0) * TOE_STIFFNESS)) for factor in (2.0, 4.0)}
+_STIFF = {1.0: {}} | {factor: both(braced(toe_stiffness=(factor - 1.0) * TOE_STIFFNESS)) for factor in (2.0, 4.0)}
 _STIFF_NOTE = f"× 2 and × 4 are springs at the toe beside its own {TOE_STIFFNESS:g} N·m/rad"
 _SLOPES = {"level": {}, "up": {"slope_deg": 4.57}, "down": {"slope_deg": -4.57}}
 _LOADS = {ratio: {"carried_ratio": ratio} for ratio in (0.0, 0.2, 0.4)}
 _LOADS_KG = {ratio: ratio * _BODY.mass for ratio in _LOADS}
 _HEAVY = {1.0: {}} | {
-    ratio: _both({"kind": "intact", "foot_mass_ratio": ratio, "foot_inertia_ratio": ratio}) for ratio in (2.0, 3.0)
+    ratio: both({"kind": "intact", "foot_mass_ratio": ratio, "foot_inertia_ratio": ratio}) for ratio in (2.0, 3.0)
 }
 _STOPS = {"free": {}} | {
-    f"stop at {rest:g}°": _both(_brace(ankle_stiffness=1000.0, ankle_deg=rest, engages="plantarflexion"))
+    f"stop at {rest:g}°": both(braced(ankle_stiffness=1000.0, ankle_deg=rest, engages="plantarflexion"))
     for rest in (0.0, -5.0, -10.0)
 }
 _ROUGH = {"smooth": {}, "rough": {"unevenness_m": 0.0125}}
@@ -137,7 +90,7 @@ _TOE_ON_SLOPES = {
 }
 _TOE_ON_ROUGH = {toe: foot | {"unevenness_m": 0.0125} for toe, foot in _TOE.items()}
 _HINGES = {
-    k: {"right_foot": _brace(ankle_stiffness=k, ankle_deg=0.0, engages="dorsiflexion")}
+    k: {"right_foot": braced(ankle_stiffness=k, ankle_deg=0.0, engages="dorsiflexion")}
     for k in (0.0, 14.0, 57.0, 115.0, 212.0)
 }
 
@@ -280,10 +233,10 @@ EXPERIMENTS: dict[str, Experiment | str] = {
     ),
     "pushoff_cost": _per_ankle_work_lost(lambda walk: walk[FIBRE] * walk["step_length_m"]),
     "rigid_both_cost": Experiment(
-        conditions={_SOUND: {}, "rigid": _both("rigid")}, speed=1.25, effect=change(FIBRE, "rigid", _SOUND)
+        conditions={_SOUND: {}, "rigid": both("rigid")}, speed=1.25, effect=change(FIBRE, "rigid", _SOUND)
     ),
     "stay_propulsion": Experiment(
-        conditions={_SOUND: {}, "stay": {"right_foot": _brace(ankle_stiffness=1000.0, ankle_deg=0.0)}},
+        conditions={_SOUND: {}, "stay": {"right_foot": braced(ankle_stiffness=1000.0, ankle_deg=0.0)}},
         speed=0.8,
         walked=False,
         effect=difference("right_forward_bw", "stay", _SOUND),

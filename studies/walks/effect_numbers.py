@@ -4,7 +4,8 @@ All come from `springfoot.evaluation.numbers`: from metrics, or derived from the
 measures. Each episode is measured alone, so that conditions are compared in pairs of episodes.
 """
 
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +17,10 @@ from springfoot.evaluation.recording import TICK, WARM_UP, Recording
 from springfoot.gait import GRAVITY, PERCENT
 from springfoot.gait.people import on_percent
 
+from ..base.kept import Kept
+from ..base.study import OnProgress, PersonsStudy
+from ..feet.adapting_persons import person_and_settings
+from ..feet.condition_walks import ConditionWalks
 from ..feet.walked_speeds import TWO_PRICES
 
 FIBRE, ALL_EFFORT = TWO_PRICES
@@ -37,22 +42,33 @@ EFFECT_NUMBERS = (
 again."""
 
 
+def episode_walks(study: PersonsStudy) -> ConditionWalks:
+    """Return how a study of persons walks under conditions, with the numbers of each episode."""
+    return ConditionWalks(
+        study=study,
+        measured=lambda recording: {"episodes": numbers_by_episode(recording)},
+        names=EFFECT_NUMBERS,
+        kept=Kept(study.keep),
+        find=person_and_settings,
+    )
+
+
+def walked_rows(
+    under: ConditionWalks, person: str, walks: Sequence[tuple[Any, Mapping[str, Any]]], progress: OnProgress
+) -> list[dict[str, Any]]:
+    """Return a row for each of a person's walks (condition, settings with a `speed`) and each episode: `condition`,
+    `episode`, `speed_m_s` (commanded), and the numbers."""
+    numbers = under.walk(person, [given for _, given in walks], progress)
+    return [
+        {"condition": condition, "episode": episode, "speed_m_s": given["speed"], **measured}
+        for (condition, given), of_walk in zip(walks, numbers, strict=True)
+        for episode, measured in enumerate(of_walk["episodes"])
+    ]
+
+
 def numbers_by_episode(recording: Recording) -> list[dict[str, float | None]]:
     """Return `EFFECT_NUMBERS` and `falls`, 1 for a fall, of each episode; after a fall the numbers are None."""
-    return [_numbers_of(_episode(recording, index)) for index in range(len(recording.ticks))]
-
-
-def _episode(recording: Recording, index: int) -> Recording:
-    """Return one episode of a recording as a recording."""
-    alone = slice(index, index + 1)
-    return replace(
-        recording,
-        seed=recording.seed + index,
-        ticks=recording.ticks[alone],
-        returns=recording.returns[alone],
-        fall_reason=recording.fall_reason[alone],
-        series={name: values[alone] for name, values in recording.series.items()},
-    )
+    return [_numbers_of(recording.of_episode(index)) for index in range(len(recording.ticks))]
 
 
 def _numbers_of(recording: Recording) -> dict[str, float | None]:

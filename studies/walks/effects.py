@@ -9,8 +9,7 @@ of the effort beside it. Conditions of an effect walk the same episodes, so each
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
@@ -18,22 +17,17 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 import tyro
 
-from springfoot.agents.policies import PolicyFunction
 from springfoot.arrays import NDArray
-from springfoot.envs import BipedSettings
-from springfoot.envs.settings import FOOT_SETTINGS
 from springfoot.errors import SpringfootError, perhaps
-from springfoot.evaluation.recording import record_feet
 from springfoot.files.markdown import MISSING, table
 from springfoot.files.text_table import read_csv
 
 from ..base.intervals import mean_interval
-from ..base.kept import Kept
-from ..base.study import Answer, OnProgress, WalkingStudy
-from ..feet.adapting_persons import person_and_settings
+from ..base.study import Answer, OnProgress, PersonsStudy
 from ..feet.walked_speeds import Row, at_walked_speeds, rows_csv
-from .effect_experiments import EXPERIMENTS, Experiment, Measured
-from .effect_numbers import ALL_EFFORT, EFFECT_NUMBERS, FIBRE, numbers_by_episode
+from .condition_effects import Measured, by_condition
+from .effect_experiments import EXPERIMENTS, Experiment
+from .effect_numbers import ALL_EFFORT, EFFECT_NUMBERS, FIBRE, episode_walks, walked_rows
 
 PUBLISHED_EFFECTS = Path("docs", "effects.csv")
 """Table of published effects, in the repository and in the package."""
@@ -46,26 +40,12 @@ UNCLEAR = "unclear"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Effects(WalkingStudy):
+class Effects(PersonsStudy):
     """Walk persons under the conditions of published effects, and hold sign and size against those in people."""
 
-    persons: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="PERSON ...")] = ("learned",)
-    """Policies that move the person: run folders, files, or `learned`."""
     effects: Annotated[tuple[str, ...], tyro.conf.arg(metavar="EFFECT ...")] = ()
     """Names of effects to walk, those of docs/effects.csv; none for all."""
-    episodes: int = 5
-    """Episodes of each condition and commanded speed."""
-    seconds: float = 12.0
-    """Length of each episode."""
-    keep: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """File in which the numbers of each walk are kept, to go on after a stop."""
-
-    QUICK: ClassVar[Mapping[str, Any]] = {
-        "episodes": 1,
-        "seconds": 6.0,
-        "keep": None,
-        "effects": ("slope_up", "stay_propulsion"),
-    }
+    QUICK: ClassVar[Mapping[str, Any]] = {**PersonsStudy.QUICK, "effects": ("slope_up", "stay_propulsion")}
 
     def check(self) -> None:
         """Refuse counts and lengths out of range, and unknown effects."""
@@ -85,7 +65,7 @@ class Effects(WalkingStudy):
 
     def ask(self, progress: OnProgress) -> Answer:
         """Walk every person in every experiment."""
-        kept = Kept(self.keep)
+        under = episode_walks(self)
         rows = []
         for published in published_effects():
             name = published["name"]
@@ -94,43 +74,9 @@ class Effects(WalkingStudy):
             experiment = EXPERIMENTS[name]
             walks = {}
             if isinstance(experiment, Experiment):
-                walks = {person: self._walks(experiment, person, kept, progress) for person in self.persons}
+                walks = {person: walked_rows(under, person, walks_of(experiment), progress) for person in self.persons}
             rows.append(effect_row(published, experiment, walks))
         return Answer(text=self._text(rows), files={"effects.csv": rows_csv(rows)})
-
-    def _walks(self, experiment: Experiment, person: str, kept: Kept, progress: OnProgress) -> list[Row]:
-        """Return a row for each condition, commanded speed and episode of an experiment."""
-        rows = []
-        walks = walks_of(experiment)
-        numbers: dict[str, list[dict[str, float | None]]] = {}  # of what is walked now, by settings
-        for index, (condition, given) in enumerate(walks):
-
-            def make(given: dict[str, Any] = given, rest: Any = walks[index:]) -> dict[str, Any]:
-                """Walk, side by side with what differs in feet alone; return the numbers of each episode."""
-                if str(given) not in numbers:
-                    alike = [other for _, other in rest if _without_feet(other) == _without_feet(given)]
-                    numbers.update(zip(map(str, alike), self._side_by_side(person, alike, progress), strict=True))
-                return {"episodes": numbers[str(given)]}
-
-            question = [{**self.how, "threads": 0, "seconds": self.seconds}, person, given, EFFECT_NUMBERS]
-            for episode, measured in enumerate(kept.get(question, make)["episodes"]):
-                rows.append({"condition": condition, "episode": episode, "speed_m_s": given["speed"], **measured})
-        return rows
-
-    def _side_by_side(
-        self, person: str, walks: Sequence[Mapping[str, Any]], progress: OnProgress
-    ) -> list[list[dict[str, float | None]]]:
-        """Return the numbers by episode of walks whose settings differ in feet alone."""
-        act, settings = self._persons[person]
-        settings = replace(settings, **_without_feet(walks[0]))
-        feet = [{name: walk[name] for name in FOOT_SETTINGS if name in walk} for walk in walks]
-        recordings = record_feet(act, settings, feet, name=person, progress=progress, **self.how)
-        return [numbers_by_episode(recording) for recording in recordings]
-
-    @cached_property
-    def _persons(self) -> dict[str, tuple[PolicyFunction, BipedSettings]]:
-        """Return each person's policy and settings, read once."""
-        return {name: person_and_settings(name, {"episode_seconds": self.seconds}) for name in self.persons}
 
     def _text(self, rows: Sequence[Row]) -> str:
         """Return the report."""
@@ -147,11 +93,6 @@ class Effects(WalkingStudy):
                 *without,
             ]
         )
-
-
-def _without_feet(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return settings but those of feet."""
-    return {name: value for name, value in given.items() if name not in FOOT_SETTINGS}
 
 
 def published_effects() -> list[dict[str, str]]:
@@ -174,14 +115,7 @@ def measured_of(experiment: Experiment, walks: Sequence[Row]) -> Measured:
     if experiment.walked:
         speed = experiment.speed if experiment.at is None else experiment.at
         walks = at_walked_speeds(walks, ("condition", "episode"), (speed,), EFFECT_NUMBERS)
-    episodes = {
-        key: sorted((row for row in walks if row["condition"] == key), key=lambda row: row["episode"])
-        for key in experiment.conditions
-    }
-    return {
-        key: {name: np.array([row[name] for row in rows], float) for name in EFFECT_NUMBERS}  # None becomes NaN
-        for key, rows in episodes.items()
-    }
+    return by_condition(walks, experiment.conditions, EFFECT_NUMBERS)
 
 
 def effect_row(

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from springfoot.evaluation.recording.policies import policy_and_settings
-from springfoot.evaluation.recording.recording import BATCH, load_recording, record
+from springfoot.evaluation.recording.recording import BATCH, load_recording, record, record_policies
 from springfoot.gait import SpringfootError
 
 
@@ -15,6 +15,24 @@ def test_every_episode_has_its_own_seed_in_every_batch():
     for name, values in second.series.items():
         np.testing.assert_array_equal(many.series[name][BATCH:], values, err_msg=name)
     assert len({values.tobytes() for values in many.series["base"]}) == BATCH + 2
+
+
+def test_policies_side_by_side_walk_as_each_alone_in_every_batch():
+    names = [f"constant:{ankle}" for ankle in ("100,20", "300,60", "200,28")]
+    found = {name: policy_and_settings(name, {"episode_seconds": 0.3}) for name in names}
+    settings = found[names[0]][1]
+    policies = {name: policy for name, (policy, _) in found.items()}
+    episodes = BATCH // 2  # two policies in the first batch, the last alone
+    together = record_policies(policies, settings, episodes=episodes, seed=5)
+    for recording, (name, policy) in zip(together, policies.items(), strict=True):
+        alone = record(policy, settings, name=name, episodes=episodes, seed=5)
+        assert (recording.policy, recording.seed) == (name, 5)
+        for series, values in alone.series.items():
+            np.testing.assert_array_equal(recording.series[series], values, err_msg=f"{name} {series}")
+        one = recording.of_episode(3)
+        assert one.seed == 8 and one.returns == alone.returns[3]
+        np.testing.assert_array_equal(one.shown()["angle"], alone.series["angle"][3])
+    assert len({recording.series["torque"].tobytes() for recording in together}) == 3
 
 
 def test_a_recording_is_of_one_body_at_one_speed():

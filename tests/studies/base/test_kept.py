@@ -18,3 +18,18 @@ def test_what_was_measured_is_kept(tmp_path):
     Kept(path).get(["a", 2], make)
     assert len(made) == 2
     assert len(json.loads(path.read_text())) == 2
+
+
+def test_of_several_questions_those_without_an_answer_are_made_together(tmp_path):
+    kept, asked = Kept(tmp_path / "kept.json"), []
+    kept.get("b", lambda: {"value": 1})
+
+    def make(missing: list[int]) -> list[dict]:
+        asked.append(missing)
+        return [{"value": 10 * index} for index in missing]
+
+    expected = [{"value": 0}, {"value": 1}, {"value": 20}]
+    assert (
+        kept.get_all(["a", "b", "c"], make) == Kept(tmp_path / "kept.json").get_all(["a", "b", "c"], make) == expected
+    )
+    assert asked == [[0, 2]]

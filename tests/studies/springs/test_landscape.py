@@ -67,7 +67,7 @@ def test_kept_cells_are_not_walked_again(tmp_path, monkeypatch, capsys):
     assert study_main([*words, "--out", str(tmp_path / "first")]) == 0
     kept = json.loads((tmp_path / "kept.json").read_text())
     assert len(kept) == 2
-    monkeypatch.setattr("springfoot.studies.springs.landscape.record", None)  # walking again would fail
+    monkeypatch.setattr("springfoot.studies.springs.landscape.record_policies", None)  # walking again would fail
     assert study_main([*words, "--out", str(tmp_path / "second")]) == 0
     assert (tmp_path / "first/walks.csv").read_bytes() == (tmp_path / "second/walks.csv").read_bytes()
     assert "somebody falls in 0 undisturbed" in capsys.readouterr().out

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from springfoot.cli.main import study_main
-from springfoot.studies.springs.when import Link, compared, fewest_falls, links_table, verdict, visible
+from springfoot.studies.base.intervals import visible
+from springfoot.studies.springs.links import Link, compared, fewest_falls, links_table, verdict
 
 NAMES = ("constant", "per phase")
 

@@ -10,7 +10,8 @@ from springfoot.envs.settings import settings_from
 from springfoot.errors import SpringfootError
 from springfoot.evaluation.numbers import measure
 from springfoot.evaluation.recording import policy_and_settings, record
-from springfoot.studies.walks.effect_experiments import BRACES, EXPERIMENTS, STRENGTHS, Experiment, slope
+from springfoot.studies.walks.condition_effects import slope
+from springfoot.studies.walks.effect_experiments import BRACES, EXPERIMENTS, STRENGTHS, Experiment
 from springfoot.studies.walks.effect_numbers import ALL_EFFORT, EFFECT_NUMBERS, FIBRE, com_power, numbers_by_episode
 from springfoot.studies.walks.effects import (
     AROUND,
@@ -197,7 +198,7 @@ def test_power_on_the_com_from_mean_curves_has_the_measured_push_off():
 def test_a_slope_costs_what_lifting_costs_and_kept_walks_are_not_walked_again(tmp_path, monkeypatch, capsys):
     words = ["effects", "--effects", "slope_up", "--episodes", "2", "--seconds", "6", "--keep", str(tmp_path / "kept")]
     assert study_main([*words, "--out", str(tmp_path / "first")]) == 0
-    monkeypatch.setattr("springfoot.studies.walks.effects.record_feet", None)  # walking again would fail
+    monkeypatch.setattr("springfoot.studies.feet.condition_walks.record_feet", None)  # walking again would fail
     assert study_main([*words, "--out", str(tmp_path / "second")]) == 0
     first, second = ((tmp_path / out / "effects.csv").read_text(encoding="utf-8") for out in ("first", "second"))
     assert first == second

@@ -1,0 +1,58 @@
+"""Walk one policy under several conditions from the same starts, and keep the numbers of each walk."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from springfoot.agents.policies import PolicyFunction
+from springfoot.envs import BipedSettings
+from springfoot.envs.settings import FOOT_SETTINGS
+from springfoot.evaluation.recording import Recording, policy_and_settings, record_feet
+
+from ..base.kept import Kept
+from ..base.study import OnProgress, WalkingStudy
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConditionWalks:
+    """How a study walks under conditions: their episodes, what is measured of them, and where that is kept."""
+
+    study: WalkingStudy
+    """The study, which says episodes, seeds and length."""
+    measured: Callable[[Recording], dict[str, Any]]
+    """Function that returns the numbers of a recording, as JSON values."""
+    names: Sequence[str]
+    """Names of the numbers: with others all walks are measured again."""
+    kept: Kept
+    """Numbers kept so far."""
+    find: Callable[[str, dict[str, Any]], tuple[PolicyFunction, BipedSettings]] = policy_and_settings
+    """Function that returns a policy by its name, and its settings from those given."""
+
+    def walk(self, policy: str, conditions: Sequence[Mapping[str, Any]], progress: OnProgress) -> list[dict[str, Any]]:
+        """Return the numbers of a policy's walk under each of several conditions: settings that differ from the usual.
+
+        Conditions that differ in feet alone are walked side by side.
+        """
+        numbers: dict[str, dict[str, Any]] = {}
+        for rest in {str(without_feet(given)): without_feet(given) for given in conditions}.values():
+            alike = [given for given in conditions if without_feet(given) == rest]
+            questions = [
+                [{**self.study.walked, "seconds": self.study.seconds}, policy, given, self.names] for given in alike
+            ]
+
+            def make(missing: list[int], rest: dict[str, Any] = rest, alike: Any = alike) -> list[dict[str, Any]]:
+                """Walk side by side those of the conditions that are missing; return their numbers."""
+                act, settings = self.find(policy, {**rest, "episode_seconds": self.study.seconds})
+                feet = [
+                    {name: alike[index][name] for name in FOOT_SETTINGS if name in alike[index]} for index in missing
+                ]
+                recordings = record_feet(act, settings, feet, name=policy, progress=progress, **self.study.how)
+                return [self.measured(recording) for recording in recordings]
+
+            numbers |= zip(map(str, alike), self.kept.get_all(questions, make), strict=True)
+        return [numbers[str(given)] for given in conditions]
+
+
+def without_feet(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return settings but those of feet."""
+    return {name: value for name, value in given.items() if name not in FOOT_SETTINGS}

@@ -1,0 +1,163 @@
+"""Compare two classes of stiffness, one within the other, on the same episodes."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from springfoot.arrays import NDArray
+from springfoot.files.markdown import MISSING, table, text_of
+
+from ..base.intervals import LEVEL, mean_interval, paired_p, share_interval, visible
+
+Aim = Literal["fibre", "likeness"]
+"""Aim of a search: least fibre work a metre; least mean over joints of the angles' rms from people's mean."""
+UNIT_OF_AIM: dict[str, str] = dict(zip(get_args(Aim), ("J/kg/m", "°"), strict=True))
+"""Aim -> unit of its number."""
+UNDISTURBED_WALK = "undisturbed"
+"""Condition without pushes, on even ground, in words."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Link:
+    """Comparison of an outer class with the inner one on the same episodes, for one aim and condition."""
+
+    aim: str
+    """Aim of both searches."""
+    inner: str
+    """Name of the inner class."""
+    outer: str
+    """Name of the outer class."""
+    condition: str
+    """Condition in words."""
+    episodes: int
+    """Number of episodes."""
+    inner_mean: float | None
+    """Aim's number with the inner class, mean of the episodes in which both walk to the end; None without any."""
+    difference: float | None
+    """Outer less inner, mean of the same episodes; negative where the outer is better."""
+    low: float | None
+    """Lower end of its 95 % interval."""
+    high: float | None
+    """Upper end."""
+    visible: float | None
+    """Smallest difference that such an interval sees with the chance `POWER`; None for a single episode."""
+    speed_m_s: float | None
+    """Mean speed of the inner class [m/s]."""
+    speed_difference_m_s: float | None
+    """Outer less inner [m/s]."""
+    inner_falls: int
+    """Episodes in which the inner class falls."""
+    inner_falls_low: float
+    """Lower end of the 95 % interval of its share of falls [0..1]."""
+    inner_falls_high: float
+    """Upper end."""
+    outer_falls: int
+    """The same of the outer class."""
+    outer_falls_low: float
+    outer_falls_high: float
+    falls_p: float
+    """p of McNemar's exact test that both fall equally often."""
+
+
+def compared(aim: str, names: tuple[str, str], condition: str, inner: Any, outer: Any) -> Link:
+    """Return the link of two classes called `names` from their episodes.
+
+    `inner` and `outer` have, by name, lists of equal length: `fell`, `speed_m_s` and the number of each `Aim`, None
+    where nothing could be measured.
+    """
+    both = [
+        index
+        for index, pair in enumerate(zip(inner[aim], outer[aim], strict=True))
+        if None not in pair and not (inner["fell"][index] or outer["fell"][index])
+    ]
+
+    def values(walks: Any, name: str) -> NDArray:
+        """Return the numbers of the episodes in which both walk to the end, (n,)."""
+        return np.array([walks[name][index] for index in both], float)
+
+    numbers: dict[str, float | None] = dict.fromkeys(
+        ("inner_mean", "difference", "low", "high", "visible", "speed_m_s", "speed_difference_m_s")
+    )
+    if both:
+        difference = values(outer, aim) - values(inner, aim)
+        numbers |= zip(("low", "high"), mean_interval(difference), strict=True)
+        numbers |= {
+            "inner_mean": float(values(inner, aim).mean()),
+            "difference": float(difference.mean()),
+            "visible": visible(difference),
+            "speed_m_s": float(values(inner, "speed_m_s").mean()),
+            "speed_difference_m_s": float((values(outer, "speed_m_s") - values(inner, "speed_m_s")).mean()),
+        }
+    falls: dict[str, Any] = {}
+    fell = {"inner": np.array(inner["fell"], bool), "outer": np.array(outer["fell"], bool)}
+    for name, those in fell.items():
+        low, high = share_interval(int(those.sum()), len(those))
+        falls |= {f"{name}_falls": int(those.sum()), f"{name}_falls_low": low, f"{name}_falls_high": high}
+    return Link(
+        aim=aim,
+        inner=names[0],
+        outer=names[1],
+        condition=condition,
+        episodes=len(fell["inner"]),
+        falls_p=paired_p(fell["inner"], fell["outer"]),
+        **numbers,
+        **falls,
+    )
+
+
+def fewest_falls(episodes: int) -> int | None:
+    """Return the fewest falls of one class alone that McNemar's test shows in so many episodes; None if none do."""
+    for alone in range(1, episodes + 1):
+        fell = np.arange(episodes) < alone
+        if paired_p(fell, np.zeros(episodes, bool)) < 1.0 - LEVEL:
+            return alone
+    return None
+
+
+def verdict(links: Sequence[Link]) -> str:
+    """Return, in sentences, at which links the outer class is better undisturbed, aim by aim, and at which falls
+    differ."""
+    sentences = []
+    for aim in dict.fromkeys(link.aim for link in links):
+        here = [link for link in links if link.aim == aim and link.condition == UNDISTURBED_WALK]
+        seen = [link for link in here if link.high is not None and link.high < 0.0]
+        gains = [
+            f"{link.outer} {link.difference:+.3f} [{link.low:.3f}, {link.high:.3f}] {UNIT_OF_AIM[aim]} "
+            f"({100 * link.difference / link.inner_mean:+.1f} %)"
+            for link in seen
+            if link.difference is not None and link.inner_mean is not None
+        ]
+        others = [link.outer for link in here if link not in seen]
+        better = f"better than the class within: {', '.join(gains)}" if gains else "none is better"
+        rest = f"; not better: {', '.join(others)}" if gains and others else ""
+        sentences.append(f"For {aim}, undisturbed, {better}{rest}.")
+    fewer = [
+        f"{link.outer} ({link.aim}, {link.condition}: {link.inner_falls} to {link.outer_falls} of {link.episodes})"
+        for link in links
+        if link.falls_p < 1.0 - LEVEL
+    ]
+    sentences.append(f"Falls differ {'with ' + ', '.join(fewer) if fewer else 'at no link'}.")
+    return " ".join(sentences)
+
+
+def links_table(links: Sequence[Link]) -> str:
+    """Return the Markdown table of one aim's links, a line each, with a column of falls for each condition."""
+    conditions = list(dict.fromkeys(link.condition for link in links))
+    lines = []
+    for names in dict.fromkeys((link.inner, link.outer) for link in links):
+        here = {link.condition: link for link in links if (link.inner, link.outer) == names}
+        level = here[conditions[0]]
+        falls = [f"{here[name].inner_falls}, {here[name].outer_falls} of {here[name].episodes}" for name in conditions]
+        lines.append([" ⊂ ".join(names), text_of(level.inner_mean, ".2f"), _difference(level), *falls])
+    unit = UNIT_OF_AIM[links[0].aim]
+    return table(["classes", f"inner, {unit}", f"outer less inner, {unit}", *conditions], lines)
+
+
+def _difference(link: Link) -> str:
+    """Return the difference of a link with its interval and the smallest visible one as text."""
+    if link.difference is None:
+        return MISSING
+    seen = text_of(link.visible, ".3f")
+    return f"{link.difference:+.3f} [{link.low:+.3f}, {link.high:+.3f}] ({seen})"
