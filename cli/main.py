@@ -86,6 +86,7 @@ STUDIES = {
     ),
     "effects": ("walks.effects.Effects", "Does a person change as people did in laboratories, in sign and size?"),
     "changes": ("walks.changes.Changes", "Does a walk change with speed as people's does?"),
+    "toe": ("walks.toe.ToeJoint", "What does a toe joint do for a walk: free, sprung, locked or absent?"),
     "when": ("springs.when.When", "What does it buy to vary ankle and toe stiffness within the step? (searches)"),
     "orthosis": ("feet.orthosis.Orthosis", "Which spring beside the ankles helps weak calves?"),
     "prosthesis": ("feet.prosthesis.Prosthesis", "Which stiffness of a passive prosthetic ankle takes least?"),

@@ -37,6 +37,7 @@ EFFECT_NUMBERS = (
     *("dorsiflexion_deg", "ankle_power_W_kg", "ankle_moment_Nm_kg", "knee_moment_Nm_kg", "ankle_fibres_Nm"),
     *("right_push_off_J_kg", "right_com_push_off_J_kg", "right_hip_net_J_kg", "right_forward_bw"),
     *("right_knee_at_toe_off_deg", "right_knee_straightest_deg", "clearance_sound_less_right_m"),
+    *("knee_loading_deg", "knee_swing_deg"),
 )
 """Names of the numbers. They are part of the question of kept results, so that a new number has all walks measured
 again."""
@@ -87,6 +88,7 @@ def _of_both_legs(gait: Gait, recording: Recording) -> dict[str, float | None]:
     body = body_of(recording.settings)
     curves = gait.both
     stance = metrics["toe_off_percent"] >= PERCENT
+    knee = curves.mean("knee_flexion_deg")
     return {
         "walked_m_s": metrics["speed_m_s"]["mean"],
         FIBRE: effort["fibre_J_kg_m"],
@@ -106,6 +108,8 @@ def _of_both_legs(gait: Gait, recording: Recording) -> dict[str, float | None]:
         "ankle_power_W_kg": float(curves.mean("ankle_power_W_per_kg").max()),
         **{f"{joint}_moment_Nm_kg": metrics["moments"][joint]["peak_Nm_kg"] for joint in ("ankle", "knee")},
         "ankle_fibres_Nm": float(_ankle_fibres(recording).max()),
+        "knee_loading_deg": float(knee[metrics["toe_off_percent"] / 2 >= PERCENT].max()),  # flexion, as below
+        "knee_swing_deg": float(knee[~stance].max()),
     }
 
 

@@ -1,0 +1,264 @@
+"""Ask what a toe joint does for a walk: free, sprung, locked or absent, on both feet, for persons who adapt to each.
+
+    springfoot study toe
+    springfoot study toe learned runs/person --keep runs/toe.json
+
+With sound ankles springs are added to the toe's own muscles, as stiff insoles are (Takahashi et al. 2016); with passive
+ankles the toe's spring is all it has, as in a prosthesis (McDonald et al. 2021). All walk the same starts. They are
+compared where they walk equally fast, so a price is that of the kept speed.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from springfoot.arrays import NDArray
+from springfoot.files.markdown import MISSING, table, text_of
+
+from ..base.intervals import mean_interval, visible
+from ..base.study import Answer, OnProgress, PersonsStudy
+from ..feet.both_feet import both, braced
+from ..feet.walked_speeds import ASKED_SPEEDS, WALKED_SPEEDS, Row, at_walked_speeds, rows_csv
+from .condition_effects import Effect, Measured, by_condition, change, difference
+from .effect_experiments import LOCKED_TOE
+from .effect_numbers import EFFECT_NUMBERS, FIBRE, episode_walks, walked_rows
+from .effects import published_effects, sign_is
+
+TOE_FREE = "free"
+TOE_LOCKED = "locked"
+TOE_ABSENT = "absent"
+ADDED = (28.0, 84.0, 252.0)
+"""Stiffness of springs beside a sound toe [N m/rad]: its own 28 (Takahashi et al. 2016: × 2 to × 4), and × 10."""
+PASSIVE = (0.0, 20.0, 60.0)
+"""Stiffness of a passive foot's toe [N m/rad], up to the flexible one of McDonald et al. 2021."""
+
+
+class Toe(NamedTuple):
+    """A toe of both feet."""
+
+    ankles: str
+    """What ankles it is walked with: `SOUND_ANKLES` or `PASSIVE_ANKLES`."""
+    toe: str
+    """The toe in words."""
+
+
+SOUND_ANKLES = "sound ankles"
+PASSIVE_ANKLES = "passive ankles"
+TOES: dict[Toe, Mapping[str, Any]] = {
+    Toe(SOUND_ANKLES, TOE_FREE): {},
+    **{Toe(SOUND_ANKLES, f"spring of {k:g}"): both(braced(toe_stiffness=k)) for k in ADDED},
+    Toe(SOUND_ANKLES, TOE_LOCKED): both("rigid_toe"),
+    Toe(SOUND_ANKLES, TOE_ABSENT): both("no_toe"),
+    **{
+        Toe(PASSIVE_ANKLES, f"spring of {k:g}" if k else TOE_FREE): both({"kind": "passive", "toe_stiffness": k})
+        for k in PASSIVE
+    },
+    Toe(PASSIVE_ANKLES, TOE_LOCKED): both({"kind": "passive", "toe_stiffness": LOCKED_TOE}),
+}
+"""Toe -> settings that differ from the sound walk."""
+AGAINST = {SOUND_ANKLES: TOE_FREE, PASSIVE_ANKLES: TOE_LOCKED}
+"""Ankles -> toe that the others with them are compared with: on passive ones nobody walks with a free toe."""
+FOOT_WORK = "ankle_toe_positive_J_kg"
+"""Number: positive work of ankle and toe in a stride."""
+NUMBERS = {
+    "push_off_J_kg": ("CoM push-off, J/kg", ".3f"),
+    FOOT_WORK: ("ankle and toe, positive work, J/kg", ".3f"),
+    "collision_J_kg": ("collision, J/kg", ".3f"),
+    FIBRE: ("fibre work, J/kg/m", ".2f"),
+    "knee_loading_deg": ("knee, loading, °", ".1f"),
+    "knee_swing_deg": ("knee, swing, °", ".1f"),
+    "knee_moment_Nm_kg": ("knee moment, N·m/kg", ".2f"),
+}
+"""Number of the table -> its heading and format."""
+BESIDE = {
+    "toe_pushoff": change(FOOT_WORK, Toe(PASSIVE_ANKLES, "spring of 60"), Toe(PASSIVE_ANKLES, TOE_LOCKED)),
+    "toe_com_pushoff": change("push_off_J_kg", Toe(PASSIVE_ANKLES, "spring of 60"), Toe(PASSIVE_ANKLES, TOE_LOCKED)),
+    "stiff_foot_cost": change(FIBRE, Toe(SOUND_ANKLES, "spring of 84"), Toe(SOUND_ANKLES, TOE_FREE)),
+    "stiff_foot_loss": change("toe_negative_J_kg", Toe(SOUND_ANKLES, "spring of 84"), Toe(SOUND_ANKLES, TOE_FREE)),
+    "stiff_foot_force": change("ankle_moment_Nm_kg", Toe(SOUND_ANKLES, "spring of 84"), Toe(SOUND_ANKLES, TOE_FREE)),
+}
+"""Effect of docs/effects.csv on a toe on level ground -> the same of both feet here [%]."""
+COMMAND = 1.2
+"""Commanded speed whose walked speed the table tells [m/s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ToeJoint(PersonsStudy):
+    """Walk persons with toes free, sprung, locked and absent, and compare work, price and knee at equal speed."""
+
+    @property
+    def total(self) -> float:
+        """Return the simulated time of all walks if none falls [s]."""
+        return len(self.persons) * len(TOES) * len(self._asked()) * self.episodes * self.seconds
+
+    def ask(self, progress: OnProgress) -> Answer:
+        """Walk every person on every toe."""
+        under = episode_walks(self)
+        asked = [(toe, {**given, "speed": speed}) for (toe, given), speed in product(TOES.items(), self._asked())]
+        walks = {person: list(map(with_foot, walked_rows(under, person, asked, progress))) for person in self.persons}
+        speeds = (0.9,) if self.quick else WALKED_SPEEDS
+        even = {speed: {person: measured_at(speed, own) for person, own in walks.items()} for speed in speeds}
+        compared = [row for speed, measured in even.items() for row in compared_rows(speed, measured)]
+        shown = speeds[len(speeds) // 2]
+        beside = [row for speed, measured in even.items() for row in beside_rows(speed, measured)]
+        command = COMMAND if COMMAND in self._asked() else max(self._asked())
+        files = {
+            "toe.csv": rows_csv(compared),
+            "published.csv": rows_csv(beside),
+            "walks.csv": rows_csv([_labelled(person, row) for person, own in walks.items() for row in own]),
+        }
+        everyone = [row for own in walks.values() for row in own]
+        parts = [
+            f"**{verdict(compared, beside, shown)}**",
+            toe_table(compared, everyone, shown, command),
+            beside_table([row for row in beside if row["speed_m_s"] == shown]),
+            self._note(shown),
+        ]
+        return Answer(text="\n\n".join(parts), files=files)
+
+    def _note(self, shown: float) -> str:
+        """Return the words below the tables, of walks at `shown` m/s."""
+        asked = ", ".join(f"{speed:g}" for speed in self._asked())
+        return (
+            f"Both feet, walking {shown:g} m/s; in brackets the difference from the free toe, with passive ankles from "
+            "the locked one, and its 95 % interval over persons and starts: of one person it tells how starts differ, "
+            "and no more. Springs in N·m/rad, at a sound toe beside its muscles. "
+            f"Persons: {', '.join(self.persons)}; {self.what_ran} of each toe and commanded speed, {asked} m/s; falls "
+            "are of all. People's effects are of docs/effects.csv; McDonald's people had one such foot."
+        )
+
+    def _asked(self) -> Sequence[float]:
+        """Return the commanded speeds [m/s]."""
+        return ASKED_SPEEDS[:2] if self.quick else ASKED_SPEEDS
+
+
+def with_foot(row: Row) -> dict[str, Any]:
+    """Return a row of `walked_rows` with the number `FOOT_WORK`."""
+    parts = [row[f"{joint}_positive_J_kg"] for joint in ("ankle", "toe")]
+    return {**row, FOOT_WORK: None if None in parts else sum(parts)}
+
+
+def measured_at(speed: float, walks: Sequence[Row]) -> Measured:
+    """Return the numbers of each toe and episode of a person where it walks at a `speed` [m/s]."""
+    names = (*EFFECT_NUMBERS, FOOT_WORK)
+    return by_condition(at_walked_speeds(walks, ("condition", "episode"), (speed,), names), TOES, names)
+
+
+def compared_rows(speed: float, measured: Mapping[str, Measured]) -> list[dict[str, Any]]:
+    """Return a row for each toe and number of `NUMBERS` at a walked `speed` [m/s], of persons' numbers by toe.
+
+    It has the mean, the difference from the toe it is compared with (`AGAINST`) and its 95 % interval, the smallest
+    difference that so many pairs show, their number, and of several persons each one's difference. None where no pair
+    walks.
+    """
+    rows = []
+    for toe, number in product(TOES, NUMBERS):
+        against = toe._replace(toe=AGAINST[toe.ankles])
+        apart = difference(number, toe, against)
+        relative = change(number, toe, against)
+        row = {**toe._asdict(), "speed_m_s": speed, "number": number}
+        row |= {"mean": _mean(_known(lambda one, toe=toe, number=number: one[toe][number], measured.values()))}
+        rows.append(row | _paired(apart, measured) | {"percent": _mean(_known(relative, measured.values()))})
+    return rows
+
+
+def beside_rows(speed: float, measured: Mapping[str, Measured]) -> list[dict[str, Any]]:
+    """Return a row for each effect of `BESIDE` at a walked `speed` [m/s]: published, here [%], and whether the sign is
+    right."""
+    published = {row["name"]: row for row in published_effects()}
+    rows = []
+    for name, effect in BESIDE.items():
+        paired = _paired(effect, measured)
+        known = {key: published[name][key] or None for key in ("source", "sign", "size", "unit")}
+        sign = sign_is(published[name]["sign"], paired["low"], paired["high"])
+        rows.append(
+            {"effect": name, **known, "speed_m_s": speed, **paired, "sign_is": sign if paired["pairs"] else None}
+        )
+    return rows
+
+
+def _paired(effect: Effect, measured: Mapping[str, Measured]) -> dict[str, Any]:
+    """Return the mean of an effect over persons and episodes, its 95 % interval, the smallest visible one, the number
+    of pairs, and of several persons each one's mean."""
+    values = _known(effect, measured.values())
+    low, high = mean_interval(values) if len(values) > 1 else (None, None)
+    own = {person: _mean(_known(effect, [numbers])) for person, numbers in measured.items()}
+    seen = visible(values)
+    row = {"difference": _mean(values), "low": low, "high": high, "visible": seen, "pairs": len(values)}
+    return row | (own if len(own) > 1 else {})
+
+
+def _known(effect: Effect, measured: Any) -> NDArray:
+    """Return the values of an effect that are known, of several persons' numbers, (pairs,)."""
+    with np.errstate(invalid="ignore", divide="ignore"):  # a number that is 0, such as the work of a locked toe
+        values = np.concatenate([effect(numbers) for numbers in measured])
+    return values[np.isfinite(values)]
+
+
+def _mean(values: NDArray) -> float | None:
+    """Return the mean of values; None without any."""
+    return float(values.mean()) if len(values) else None
+
+
+def _labelled(person: str, row: Row) -> dict[str, Any]:
+    """Return a walk's row for its CSV: person and toe first, then the rest."""
+    return {"person": person, **row["condition"]._asdict(), **{k: v for k, v in row.items() if k != "condition"}}
+
+
+def verdict(compared: Sequence[Row], beside: Sequence[Row], speed: float) -> str:
+    """Return the answer in a sentence: what locked and absent toes change at a walked `speed`, and how many published
+    directions are met there."""
+    told = []
+    for toe in (TOE_LOCKED, TOE_ABSENT):
+        here = {row["number"]: row for row in compared if _is_toe(row, Toe(SOUND_ANKLES, toe), speed)}
+        changes = [
+            f"{words} {text_of(here[number]['percent'], '+.0f')} %"
+            for number, words in (("push_off_J_kg", "push-off"), ("collision_J_kg", "collision"), (FIBRE, "fibre work"))
+        ]
+        told.append(f"a toe that is {toe} changes {', '.join(changes)}")
+    signs = [row["sign_is"] for row in beside if row["speed_m_s"] == speed]
+    return (
+        f"Walking {speed:g} m/s, {'; '.join(told)}, against the free toe; of {len(signs)} published directions "
+        f"{signs.count('right')} are met."
+    )
+
+
+def _is_toe(row: Row, toe: Toe, speed: float) -> bool:
+    """Return True for a row of `compared_rows` of this toe and walked speed."""
+    return (row["ankles"], row["toe"], row["speed_m_s"]) == (*toe, speed)
+
+
+def toe_table(compared: Sequence[Row], walks: Sequence[Row], speed: float, command: float) -> str:
+    """Return the Markdown table of the toes: falls, the speed walked at a `command`, and the numbers at a walked
+    `speed` with their differences."""
+    lines = []
+    for toe in TOES:
+        own = [row for row in walks if row["condition"] == toe]
+        falls = f"{sum(int(row['falls']) for row in own)} of {len(own)}"
+        walked = [row["walked_m_s"] for row in own if row["speed_m_s"] == command and row["walked_m_s"] is not None]
+        here = {row["number"]: row for row in compared if _is_toe(row, toe, speed)}
+        cells = [_cell(here[number], form) for number, (_, form) in NUMBERS.items()]
+        lines.append([", ".join(toe), falls, text_of(_mean(np.array(walked)), ".2f"), *cells])
+    return table(["toe", "falls", f"walked at {command:g} m/s", *(words for words, _ in NUMBERS.values())], lines)
+
+
+def _cell(row: Row, form: str) -> str:
+    """Return a number with its difference from the toe it is compared with."""
+    if row["toe"] == AGAINST[row["ankles"]] or row["difference"] is None:
+        return text_of(row["mean"], form)
+    ends = "" if row["low"] is None else f" [{row['low']:+{form}}, {row['high']:+{form}}]"
+    return f"{text_of(row['mean'], form)} ({row['difference']:+{form}}{ends})"
+
+
+def beside_table(beside: Sequence[Row]) -> str:
+    """Return the Markdown table of published effects beside those here."""
+    lines = []
+    for row in beside:
+        ends = "" if row["low"] is None else f" ({row['low']:+.1f} to {row['high']:+.1f})"
+        people = f"{row['size']} {row['unit']}" if row["size"] else row["sign"]
+        here = f"{text_of(row['difference'], '+.1f')}{ends}"
+        lines.append([row["effect"], row["source"], people, here, row["sign_is"] or MISSING])
+    return table(["effect", "measured by", "people", "here, %", "sign"], lines)
