@@ -10,7 +10,7 @@ export OMP_NUM_THREADS ?= 1
 # On every core, neighbours together as long as no core is idle: what the tests of a file share is made once or twice.
 PYTEST := $(BIN)/python -m pytest --numprocesses auto --dist worksteal
 
-.PHONY: help install walk predict test test-all test-wheel test-sdist test-lowest notebooks licences test-learners test-rllib test-kills fuzz extremes mutants check format bench docs lock clean
+.PHONY: help install walk predict answers test test-all test-wheel test-sdist test-lowest notebooks licences test-learners test-rllib test-kills fuzz extremes mutants check format bench docs lock clean
 
 help:
 	@echo "make walk     train with the defaults, then evaluate what was trained (results in runs/)"
@@ -34,6 +34,7 @@ help:
 	@echo "make install  only $(VENV), from requirements.lock; the others do it by themselves"
 	@echo "make lock     requirements.lock anew: the versions of constraints.txt with the hash of every file"
 	@echo "make predict  a walk from nothing: plan, leg constants, policy; goes on after a stop"
+	@echo "make answers  the studies of docs/answers.md in build/answers; goes on after a stop; QUICK=1: their shape in a minute"
 	@echo "make clean    remove .venv, builds and caches, never runs/"
 
 install: $(VENV)/installed
@@ -185,6 +186,25 @@ format: install
 # Each stage is kept in runs/predict: after a stop the same command goes on.
 predict: install
 	$(BIN)/springfoot study predict
+
+# The studies that docs/answers.md rests on, with the person of the package, each into a folder: two at a time with
+# `make -j2 answers`, with the same bits. Their walks are kept in build/answers/kept: after a stop the same command goes on.
+ANSWERS := build/answers$(if $(QUICK),-quick)
+STUDY_landscape := landscape learned
+STUDY_when := when learned --generations 30
+STUDY_toe := toe learned
+STUDY_effects := effects learned
+STUDY_controls := controls learned
+
+answers: $(foreach study,landscape when toe effects controls,$(ANSWERS)/$(study)/report.md)
+
+$(ANSWERS)/%/report.md: $(if $(QUICK),FORCE) | install
+	$(if $(QUICK),rm -rf $(@D))
+	@began=$$SECONDS; \
+	$(BIN)/python -m springfoot study $(STUDY_$*) --out $(@D) $(if $(QUICK),--quick,--keep $(ANSWERS)/kept/$*) \
+	  && echo "$*: $$((SECONDS - began)) s"
+
+FORCE:
 
 bench: install
 	$(BIN)/python -m benchmarks.bench
