@@ -171,8 +171,10 @@ def open_loop_copy(
     itself if the feet differ. If other speeds can be commanded, it is taken at each tabulated speed, and is linear
     between them; K scales with the body. The equilibrium is that of the settings. A residual action can leave the range
     of absolute actions, a copy cannot: K beyond the range becomes its nearer end. Raises `SpringfootError` for a policy
-    that walks no strides.
+    that walks no strides, and for one that moves the legs too.
     """
+    if settings.acts != "stiffness":
+        raise SpringfootError(f"{name} has no open-loop copy: it moves the legs too (acts {settings.acts!r})")
     undisturbed = replace(settings, **(UNDISTURBED | dict.fromkeys(DRAWN_SETTINGS)))
     groups = alike_legs(settings)
     # Group of each side. A leg with a device is in none, and follows no K: it is given that of the other leg.

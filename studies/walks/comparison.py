@@ -122,8 +122,10 @@ def contenders(
 
 
 def with_copy(name: str, given: dict[str, Any], seed: int = 0, threads: int = 2) -> list[Contender]:
-    """Return the policy `name` and, if it has feedback, its open-loop copy."""
-    return [Contender(row_name, *policy_and_settings(row_name, given, seed, threads)) for row_name in and_copy(name)]
+    """Return the policy `name` and, if it sets stiffness alone and has feedback, its open-loop copy."""
+    first = Contender(name, *policy_and_settings(name, given, seed, threads))
+    copies = and_copy(name)[1:] if first.settings.acts == "stiffness" else ()
+    return [first, *(Contender(copy, *policy_and_settings(copy, given, seed, threads)) for copy in copies)]
 
 
 def springs_beside(
@@ -137,9 +139,12 @@ def springs_beside(
 
     These are the start of its training; the tuned schedule, and a `factor` on it; a `constant` (ankle, toe) [N m/rad]
     and the default one; people's quasi-stiffness as it is, and commanded `QUASI_SPEED`; the thesis's lines, completed
-    and as printed; random actions. Each row pays for changes of its own action.
+    and as printed; random actions. Each row pays for changes of its own action. Raises `SpringfootError` for a policy
+    that moves the legs too.
     """
     _, settings = policy_and_settings(name, given, seed)
+    if settings.acts != "stiffness":
+        raise SpringfootError(f"{name} moves the legs too, which springs cannot: give --no-springs")
     springs = []
     for baseline in spring_names(constant, factor):
         conditions = settings_to_json(settings) | own_settings(baseline, settings)

@@ -11,6 +11,7 @@ import pytest
 from springfoot.agents.policies.baselines import BASELINES, constant
 from springfoot.cli.main import study_main
 from springfoot.envs.settings.settings import settings_from
+from springfoot.errors import SpringfootError
 from springfoot.evaluation.numbers.metrics import measure
 from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.evaluation.recording.recording import record
@@ -189,3 +190,14 @@ def test_elsewhere_every_condition_is_a_row_of_what_evaluate_would_find(monkeypa
     uphill = measure(record(policy, settings, name="", episodes=1)).metrics
     assert float(lines[1]["speed_m_s_mean"]) == pytest.approx(uphill["speed_m_s"]["mean"], rel=1e-5)
     assert lines[0] != lines[1]
+
+
+def test_a_policy_that_moves_the_legs_walks_without_copy_and_springs(capsys):
+    (alone,) = comparison.with_copy("learned", {"episode_seconds": 1.0})
+    assert alone.name == "learned" and alone.settings.acts == "both"
+    with pytest.raises(SpringfootError, match="learned has no open-loop copy: it moves the legs too"):
+        policy_and_settings("frozen:learned", {})
+    assert study_main(["compare", "learned", "--quick"]) == 2
+    assert capsys.readouterr().err == (
+        "springfoot study compare: error: learned moves the legs too, which springs cannot: give --no-springs\n"
+    )
