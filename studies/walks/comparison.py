@@ -3,6 +3,7 @@
     springfoot study compare pretrained --constant 363 79.5 --factor 1.07
     springfoot study compare runs/five/seed-0 runs/five/seed-1 runs/five/seed-2 --no-springs --pushes 0
     springfoot study compare pretrained --no-springs --pushes 0 --world
+    springfoot study compare learned --no-springs --pushes 0 --laboratory
 
 Each policy walks in its own environment, springs in the first policy's; all rows have the same seeds and are measured
 as by `evaluate.py`. Returns are compared episode by episode (paired bootstrap), falls by McNemar's test.
@@ -27,6 +28,7 @@ from ..base.columns import OPEN_LOOP, WALK_COLUMNS, falls_text, rmse_text, walks
 from ..base.flags import RecordedFlags, given
 from ..base.intervals import RESAMPLES, mean_interval, paired_p, share_interval
 from ..base.study import Answer, OnProgress, WalkingStudy
+from .laboratory import LABORATORY, laboratory_csv, laboratory_table
 
 PUSHES = (150.0, 200.0)
 """Default pushes of `compare` [N]."""
@@ -265,12 +267,20 @@ class Compare(WalkingStudy):
     """Sizes of the pushes [N], a table each."""
     world: bool = False
     """Also walk every policy on slopes, uneven and slippery ground, with delays, loads and other proportions."""
+    laboratory: bool = False
+    """Also walk every policy on slopes of 8 %, with loads on the back and on heavy feet, as laboratories had people."""
     episodes: int = 100
     """Episodes of each row."""
     environment: tyro.conf.OmitArgPrefixes[RecordedFlags]  # type: ignore[valid-type]
     """Environment; a trained policy brings its own settings, standard conditions aside."""
 
-    QUICK: ClassVar[dict[str, Any]] = {"episodes": 1, "seconds": 4.0, "pushes": (150.0,), "world": False}
+    QUICK: ClassVar[dict[str, Any]] = {
+        "episodes": 1,
+        "seconds": 4.0,
+        "pushes": (150.0,),
+        "world": False,
+        "laboratory": False,
+    }
 
     def check(self) -> None:
         """Refuse an empty list of policies."""
@@ -286,6 +296,7 @@ class Compare(WalkingStudy):
         baselines = {*spring_names(self.constant, self.factor)} - {*self.policies}
         springs = self.springs * (len(baselines) + 1)  # quasi-stiffness walks at two speeds
         rows = len(self.pushes) * (names + springs) + self.world * len(WORLD) * names
+        rows += self.laboratory * len(LABORATORY) * len(self.policies)
         return rows * self.episodes * self.seconds
 
     def ask(self, progress: OnProgress) -> Answer:
@@ -317,6 +328,14 @@ class Compare(WalkingStudy):
                     for row in rows
                 ]
             )
+        if self.laboratory:
+            walks = {name: self._in_laboratory(name, progress) for name in self.policies}
+            parts += [laboratory_table(name, of_policy) for name, of_policy in walks.items()]
+            parts.append(
+                f"{self.what_ran} of each row, at the same command; in brackets the change from the usual walk. "
+                "`springfoot study effects` holds such changes, at equal walked speed, against people's."
+            )
+            files["laboratory.csv"] = laboratory_csv(walks)
         return Answer(text="\n\n".join(parts), files=files)
 
     @property
@@ -340,6 +359,14 @@ class Compare(WalkingStudy):
             words = ", ".join(f"{key} {value}" for key, value in conditions.items())
             walked.append((words, [run_row(*contender, **self.how, progress=progress) for contender in contenders]))
         return walked
+
+    def _in_laboratory(self, name: str, progress: OnProgress) -> dict[str, dict[str, Any]]:
+        """Walk a policy under each of `LABORATORY`; return the metrics by condition."""
+        walks = {}
+        for words, conditions in LABORATORY.items():
+            contender = Contender(name, *policy_and_settings(name, {**self._conditions, **conditions}, self.seed))
+            walks[words] = run_row(*contender, **self.how, progress=progress).metrics
+        return walks
 
 
 def _csv_labels(push: float, row: Row, first: Row) -> dict[str, Any]:

@@ -21,6 +21,7 @@ from springfoot.gait.body import TOE_STIFFNESS
 from ..feet.both_feet import both, braced
 from .condition_effects import Effect, Measured, change, difference, mean_of, per_unit, slope
 from .effect_numbers import FIBRE
+from .laboratory import HEAVY_FEET, LOADS, SLOPES
 
 _SOUND = "sound"
 LOCKED_TOE = 1000.0
@@ -74,18 +75,13 @@ _EXO = {
 _TOE = {"locked": _passive(LOCKED_TOE), "flexible": _passive(60.0)}
 _STIFF = {1.0: {}} | {factor: both(braced(toe_stiffness=(factor - 1.0) * TOE_STIFFNESS)) for factor in (2.0, 4.0)}
 _STIFF_NOTE = f"× 2 and × 4 are springs at the toe beside its own {TOE_STIFFNESS:g} N·m/rad"
-_SLOPES = {"level": {}, "up": {"slope_deg": 4.57}, "down": {"slope_deg": -4.57}}
-_LOADS = {ratio: {"carried_ratio": ratio} for ratio in (0.0, 0.2, 0.4)}
-_LOADS_KG = {ratio: ratio * _BODY.mass for ratio in _LOADS}
-_HEAVY = {1.0: {}} | {
-    ratio: both({"kind": "intact", "foot_mass_ratio": ratio, "foot_inertia_ratio": ratio}) for ratio in (2.0, 3.0)
-}
+_LOADS_KG = {ratio: ratio * _BODY.mass for ratio in LOADS}
 _STOPS = {"free": {}} | {
     f"stop at {rest:g}°": both(braced(ankle_stiffness=1000.0, ankle_deg=rest, engages="plantarflexion"))
     for rest in (0.0, -5.0, -10.0)
 }
 _ROUGH = {"smooth": {}, "rough": {"unevenness_m": 0.0125}}
-_TOE_ON_SLOPES = {
+_TOE_ONSLOPES = {
     (toe, slope_deg): foot | {"slope_deg": slope_deg} for slope_deg in (5.0, -5.0) for toe, foot in _TOE.items()
 }
 _TOE_ON_ROUGH = {toe: foot | {"unevenness_m": 0.0125} for toe, foot in _TOE.items()}
@@ -153,7 +149,7 @@ def _number(name: str, key: Any, measured: Measured) -> NDArray:
 def _slope(of: str) -> Experiment:
     """Return an experiment on fibre work on a slope, against level ground, with its split between joints."""
     split = {joint: difference(f"fibre_{joint}_J_kg_m", of, "level") for joint in JOINTS}
-    conditions = {key: _SLOPES[key] for key in ("level", of)}
+    conditions = {key: SLOPES[key] for key in ("level", of)}
     return Experiment(conditions=conditions, speed=1.3, effect=difference(FIBRE, of, "level"), beside=split)
 
 
@@ -209,15 +205,15 @@ EXPERIMENTS: dict[str, Experiment | str] = {
     "stiff_foot_cost": _stiff_foot(FIBRE),
     "slope_up": _slope("up"),
     "slope_down": _slope("down"),
-    "load_cost": Experiment(conditions=_LOADS, speed=1.25, effect=per_unit(FIBRE, _LOADS_KG, factor=1.25 * _BODY.mass)),
+    "load_cost": Experiment(conditions=LOADS, speed=1.25, effect=per_unit(FIBRE, _LOADS_KG, factor=1.25 * _BODY.mass)),
     "load_com_work": Experiment(
-        conditions=_LOADS,
+        conditions=LOADS,
         speed=1.25,
         effect=per_unit("com_positive_W_kg", _LOADS_KG, factor=_BODY.mass),
         note="derived from mean curves of ground force and CoM velocity, both legs, all of the stride",
     ),
     "foot_mass": Experiment(
-        conditions=_HEAVY,
+        conditions=HEAVY_FEET,
         speed=1.25,
         effect=lambda measured: slope(
             [(ratio - 1.0) * _FEET_KG for ratio in (1.0, 2.0, 3.0)],
@@ -251,14 +247,14 @@ EXPERIMENTS: dict[str, Experiment | str] = {
     "rough_hip_work": _rough("hip_positive_J_kg"),
     "rough_knee_work": _rough("knee_negative_J_kg"),
     "toe_slope_pushoff": Experiment(
-        conditions=_TOE_ON_SLOPES,
+        conditions=_TOE_ONSLOPES,
         speed=1.1,
         effect=mean_of(_TOE_SLOPE_WORK),
         beside=_TOE_SLOPE_WORK,
         note=f"the mean of both slopes; ankle and toe, {_WHOLE_STRIDE}",
     ),
     "toe_slope_knee": Experiment(
-        conditions={key: given for key, given in _TOE_ON_SLOPES.items() if given["slope_deg"] > 0.0},
+        conditions={key: given for key, given in _TOE_ONSLOPES.items() if given["slope_deg"] > 0.0},
         speed=1.1,
         walked=False,
         effect=difference("right_knee_at_toe_off_deg", ("flexible", 5.0), ("locked", 5.0)),

@@ -10,7 +10,7 @@ import pytest
 
 from springfoot.agents.policies.baselines import BASELINES, constant
 from springfoot.cli.main import study_main
-from springfoot.envs.settings.settings import settings_from
+from springfoot.envs.settings.settings import settings_from, settings_to_json
 from springfoot.errors import SpringfootError
 from springfoot.evaluation.numbers.metrics import measure
 from springfoot.evaluation.recording.policies import policy_and_settings
@@ -18,6 +18,7 @@ from springfoot.evaluation.recording.recording import record
 from springfoot.studies.base import columns, intervals
 from springfoot.studies.base.flags import RecordedFlags
 from springfoot.studies.walks import comparison
+from springfoot.studies.walks.laboratory import LABORATORY
 
 SHORT = {"episode_seconds": 4.5, "push_newton": 150.0}
 THESIS = {"thesis", "thesis_printed"}
@@ -190,6 +191,24 @@ def test_elsewhere_every_condition_is_a_row_of_what_evaluate_would_find(monkeypa
     uphill = measure(record(policy, settings, name="", episodes=1)).metrics
     assert float(lines[1]["speed_m_s_mean"]) == pytest.approx(uphill["speed_m_s"]["mean"], rel=1e-5)
     assert lines[0] != lines[1]
+
+
+def test_in_the_laboratory_a_load_costs_more_and_is_told_beside_the_usual_walk(monkeypatch):
+    load = "load of 40 % on the back"
+    assert LABORATORY[load] == {"carried_ratio": 0.4}
+    monkeypatch.setattr(comparison, "LABORATORY", {name: LABORATORY[name] for name in ("usual", load)})
+    how = {"springs": False, "pushes": (0.0,), "laboratory": True, "episodes": 1, "seconds": 5.0}
+    answer = comparison.Compare(policies=("schedule",), environment=RecordedFlags(), **how).ask(lambda seconds: None)
+    usual, loaded = csv.DictReader(answer.files["laboratory.csv"].splitlines())
+    assert (usual["conditions"], loaded["conditions"]) == ("usual", load)
+    before, after = (float(row["effort_fibre_J_kg_m"]) for row in (usual, loaded))
+    assert 1.1 * before < after < 3.0 * before  # for each kg of body
+    assert f"| {after:.2f} ({after / before - 1.0:+.0%}) |" in answer.text
+
+
+def test_every_condition_of_the_laboratory_has_valid_settings_that_differ():
+    settings = [settings_from(**given) for given in LABORATORY.values()]
+    assert len({str(settings_to_json(one)) for one in settings}) == len(LABORATORY) == 7
 
 
 def test_a_policy_that_moves_the_legs_walks_without_copy_and_springs(capsys):
