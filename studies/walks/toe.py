@@ -30,8 +30,9 @@ from .effects import published_effects, sign_is
 TOE_FREE = "free"
 TOE_LOCKED = "locked"
 TOE_ABSENT = "absent"
-ADDED = (28.0, 84.0, 252.0)
-"""Stiffness of springs beside a sound toe [N m/rad]: its own 28 (Takahashi et al. 2016: × 2 to × 4), and × 10."""
+ADDED = (28.0, 84.0, 168.0, LOCKED_TOE)
+"""Stiffness of springs beside a sound toe [N m/rad]: its own 28 (Takahashi et al. 2016: × 2 to × 4), about the stiffest
+that the package's person learned with, and one that all but locks it."""
 PASSIVE = (0.0, 20.0, 60.0)
 """Stiffness of a passive foot's toe [N m/rad], up to the flexible one of McDonald et al. 2021."""
 
@@ -127,7 +128,9 @@ class ToeJoint(PersonsStudy):
             "the locked one, and its 95 % interval over persons and starts: of one person it tells how starts differ, "
             "and no more. Springs in N·m/rad, at a sound toe beside its muscles. "
             f"Persons: {', '.join(self.persons)}; {self.what_ran} of each toe and commanded speed, {asked} m/s; falls "
-            "are of all. People's effects are of docs/effects.csv; McDonald's people had one such foot."
+            "are of all. People's effects are of docs/effects.csv; McDonald's people had one such foot. The package's "
+            "person learned with locked and absent toes and passive feet on one side alone, and with springs of 10 to "
+            "180: where locked is far from a spring of 1000, suspect the person, not the toe."
         )
 
     def _asked(self) -> Sequence[float]:
