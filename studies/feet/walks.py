@@ -45,7 +45,7 @@ PAGE_COLUMNS = {
     "walked, m/s": "speed_m_s",
     "fibre work, J/kg/m": "fibre_J_kg_m",
     "push-off, J/kg": "push_off_J_kg",
-    "peak force, BW": "sound_peak_bw",
+    "largest force, BW": "sound_peak_bw",
 }
 """Heading of the page's table -> number of `FOOT_NUMBERS`."""
 
