@@ -239,13 +239,15 @@ def draw(path: Path, walks: Sequence[Row], even: Sequence[Row]) -> None:
 def _panel(
     ax: Axes, prices: Any, ankles: Sequence[float], toes: Sequence[float], fallen: set[tuple[float, ...]]
 ) -> None:
-    """Draw one panel: prices (toes, ankles), their values inside, the least one framed."""
+    """Draw one panel: prices (toes, ankles), their values inside, the least one bold."""
     ax.imshow(prices, origin="lower", aspect="auto", cmap="viridis_r")
     for (row, toe), (column, ankle) in product(enumerate(toes), enumerate(ankles)):
         value = prices[row, column]
         known = np.isfinite(value)
         text = f"{value:.2f}" if known else "×" if (ankle, toe) in fallen else "–"
         bold = known and value == np.nanmin(prices)
-        ax.text(column, row, text, ha="center", va="center", fontsize=7, fontweight="bold" if bold else None)
+        dark = known and value > np.mean([np.nanmin(prices), np.nanmax(prices)])
+        weight, color = "bold" if bold else "normal", "white" if dark else "black"
+        ax.text(column, row, text, ha="center", va="center", fontsize=7, fontweight=weight, color=color)
     ax.set_xticks(range(len(ankles)), [f"{k:g}" for k in ankles])
     ax.set_yticks(range(len(toes)), [f"{k:g}" for k in toes])
