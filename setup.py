@@ -13,6 +13,10 @@ from setuptools.command.build_py import build_py
 HERE = Path(__file__).parent
 LINK = re.compile(r"(!?)\[([^\]]+)\]\((?!https://)([^)]+)\)")
 """A picture or a link to a file of the repository: mark, text, path."""
+INSTALL = re.compile(r'pip install -e "\.(\[[^"]+\])"')
+"""The command that installs a clone with extras."""
+PINS = " -c constraints.txt"
+"""Words of a command that pins versions by a file of the clone."""
 PLACEHOLDER = "https://example.org"
 """Beginning of the repository's address as long as it has none."""
 
@@ -20,8 +24,10 @@ PLACEHOLDER = "https://example.org"
 def linked(
     page: str, source: str | None, version: str, folder: str = "", stays: Callable[[str], bool] = lambda path: False
 ) -> str:
-    """Return a page of the repository's `folder` with links made absolute by the repository's address `source`; with
-    None links become plain text. Links to paths that `stays` accepts stay.
+    """Return a page of the repository's `folder` as it is read without a clone.
+
+    It installs the package by its name. Links are absolute by the repository's address `source`; with None they become
+    plain text. Links to paths that `stays` accepts stay.
 
     A release links to its tag, any other version to the newest commit, addressed as GitHub and GitLab do.
     """
@@ -36,7 +42,7 @@ def linked(
         address = posixpath.normpath(posixpath.join(folder, path))
         return f"{mark}[{text}]({source}/{'raw' if mark else 'blob'}/{commit}/{address})"
 
-    return LINK.sub(absolute, page)
+    return LINK.sub(absolute, INSTALL.sub(r'pip install "springfoot\1"', page).replace(PINS, ""))
 
 
 def index_page(source: str | None, version: str) -> str:

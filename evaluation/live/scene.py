@@ -27,7 +27,11 @@ DAYLIGHT, SUN = 1.6, 2.2
 
 
 NARROW = 600
-"""Width of a picture in which the panel of sliders lies over the lower part [pixels]; chosen: telephones."""
+"""Width of a picture in which the panel of inputs lies over the lower part [pixels]: telephones, as viser has it."""
+WIDE = 1200
+"""Least width of a picture that has room for the body between curves and inputs [pixels]; chosen."""
+INPUTS_WIDTH = 420
+"""Width that the panel of inputs covers on the right of a picture from `NARROW` on [pixels]."""
 STANDPOINT = (0.5, -2.6, 1.0)
 """Initial place of the camera [m], beside the walk."""
 MIDDLE = (0.15, 0.0, 0.75)
@@ -37,10 +41,18 @@ NARROW_STANDPOINT, NARROW_MIDDLE = (0.7, -4.2, 1.3), (0.15, 0.0, -1.2)
 
 
 def fit_to_screen(client: viser.ClientHandle) -> None:
-    """Move the camera of a new browser with a narrow picture, so that the panel does not hide the body."""
-    if client.camera.image_width < NARROW:
-        client.camera.position = NARROW_STANDPOINT
-        client.camera.look_at = NARROW_MIDDLE
+    """Move the camera of a new browser whose picture is not wide, so that the panel of inputs does not hide the
+    body."""
+    camera = client.camera
+    if camera.image_width < NARROW:
+        camera.position = NARROW_STANDPOINT
+        camera.look_at = NARROW_MIDDLE
+    elif camera.image_width < WIDE:
+        # Half of the panel's width, in metres where the body walks: the body is in the middle of what is free.
+        metres_a_pixel = -2 * STANDPOINT[1] * np.tan(camera.fov / 2) / camera.image_height
+        aside = np.array([INPUTS_WIDTH / 2 * metres_a_pixel, 0.0, 0.0])
+        camera.position = STANDPOINT + aside
+        camera.look_at = MIDDLE + aside
 
 
 class LiveScene:

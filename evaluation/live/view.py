@@ -6,6 +6,7 @@ walk and shows it.
 
 import re
 import time
+import warnings
 from collections import deque
 from collections.abc import Callable
 from contextlib import redirect_stdout
@@ -28,7 +29,7 @@ from springfoot.gait.springs.stiffness import SPRINGS
 from .foot_entries import KIND, ORTHOSIS, ORTHOSIS_WAYS, WAY, has_entry, range_of
 from .messages import accept_values_only
 from .origin import own_pages_only
-from .scene import LiveScene, fit_to_screen
+from .scene import WIDE, LiveScene, fit_to_screen
 from .steered_walk import (
     LIVE_FACTORS,
     LIVE_HEIGHTS,
@@ -84,7 +85,9 @@ class LiveView:
         self._gui = self._server.gui
         _set_theme(self._gui)
         self._dark: set[int] = set()  # numbers of the browsers whose page is dark
-        self._server.on_client_connect(fit_to_screen)
+        self._curves: dict[int, dict[str, Any]] = {}  # number of a browser -> its charts
+        self._server.on_client_connect(self._welcome)
+        self._server.on_client_disconnect(lambda client: self._curves.pop(client.client_id, None))
         self.address = f"http://{host}:{self._server.get_port()}"
         """Address of the page."""
         self.frames = 0
@@ -94,7 +97,6 @@ class LiveView:
         self._words = self._gui.add_markdown("")
         self._add_buttons()
         self._add_wishes()
-        self._curves = self._add_curves()
         self._scene = LiveScene(self._server, session)
         self._show()
         self._send_numbers()
@@ -165,6 +167,11 @@ class LiveView:
         push.on_click(lambda _: self._requests.put(lambda: self._session.push(size.value)))
         restart.on_click(lambda _: self._requests.put(self._session.restart))
 
+    def _welcome(self, client: viser.ClientHandle) -> None:
+        """Fit the page of a new browser to its size: camera, and curves beside the body or below the inputs."""
+        fit_to_screen(client)
+        self._curves[client.client_id] = _add_curves(client.gui, wide=client.camera.image_width >= WIDE)
+
     def _turn_theme(self, client: viser.ClientHandle | None) -> None:
         """Turn the page of one browser dark, or light again; others keep theirs."""
         if client is not None:
@@ -230,25 +237,6 @@ class LiveView:
         handle = self._handles[name]
         handle.on_update(lambda event: self._requests.put({name: handle.value}) if event.client is not None else None)
 
-    def _add_curves(self) -> dict[str, Any]:
-        """Add the charts over time; return them by the name of their quantity."""
-        titles = {"ankle": "K of the ankles, N·m/rad", "toe": "K of the toes, N·m/rad", "load": "Load, body weights"}
-        panel = self._gui.add_panel()
-        panel.dock_left()
-        with panel.add_tab("Curves, the last seconds"):
-            sides = [
-                {"label": side, "stroke": shade, "width": 2} for side, shade in zip(SIDES, SIDE_COLOURS, strict=True)
-            ]
-            charts = {name: self._chart(title, sides) for name, title in titles.items()}
-            return charts | {"speed": self._chart("Speed of the CoM, m/s", [{"label": "speed", "stroke": "#009E73"}])}
-
-    def _chart(self, title: str, lines: list[dict[str, Any]]) -> Any:
-        """Add a chart of `lines` over time [s]; return its handle."""
-        empty = np.zeros(1)
-        series: Any = ({"label": "s"}, *lines)
-        time_scale: dict[str, uplot.Scale] = {"x": {"time": False}}
-        return self._gui.add_uplot((empty,) * len(series), series, title=title, scales=time_scale, height=170)
-
     def _show(self) -> None:
         """Draw the body, and count the picture."""
         self._scene.show()
@@ -277,8 +265,38 @@ class LiveView:
         curves = {name: stiffness[:, :, joint].T for joint, name in enumerate(SPRINGS)}
         curves["load"] = force[..., -1].T  # the last component, up
         curves["speed"] = np.array([[frame.speed for frame in self._history]])
-        for name, lines in curves.items():
-            self._curves[name].data = (seconds, *np.ascontiguousarray(lines))
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", message="Queued a", category=UserWarning)  # for a browser that just left
+            for charts in list(self._curves.values()):
+                for name, lines in curves.items():
+                    charts[name].data = (seconds, *np.ascontiguousarray(lines))
+
+
+def _add_curves(gui: viser.GuiApi, wide: bool) -> dict[str, Any]:
+    """Add the charts over time to one browser's page; return them by the name of their quantity.
+
+    On a wide page they stand on the left, on others below the inputs.
+    """
+    titles = {"ankle": "K of the ankles, N·m/rad", "toe": "K of the toes, N·m/rad", "load": "Load, body weights"}
+    title = "Curves, the last seconds"
+    if wide:
+        panel = gui.add_panel()
+        panel.dock_left()
+        place: Any = panel.add_tab(title)
+    else:
+        place = gui.add_folder(title)
+    with place:
+        sides = [{"label": side, "stroke": shade, "width": 2} for side, shade in zip(SIDES, SIDE_COLOURS, strict=True)]
+        charts = {name: _chart(gui, title, sides) for name, title in titles.items()}
+        return charts | {"speed": _chart(gui, "Speed of the CoM, m/s", [{"label": "speed", "stroke": "#009E73"}])}
+
+
+def _chart(gui: viser.GuiApi, title: str, lines: list[dict[str, Any]]) -> Any:
+    """Add a chart of `lines` over time [s]; return its handle."""
+    empty = np.zeros(1)
+    series: Any = ({"label": "s"}, *lines)
+    time_scale: dict[str, uplot.Scale] = {"x": {"time": False}}
+    return gui.add_uplot((empty,) * len(series), series, title=title, scales=time_scale, height=170)
 
 
 def _set_theme(gui: viser.GuiApi, dark: bool = False) -> None:

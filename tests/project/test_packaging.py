@@ -169,6 +169,12 @@ def test_the_conda_recipe_needs_what_the_wheel_needs():
     assert f"setuptools {PROJECT['build-system']['requires'][0].removeprefix('setuptools')}\n" in RECIPE
 
 
+def test_the_image_gets_every_folder_that_the_package_is_made_of():
+    kept = (ROOT / "recipes" / "Dockerfile.dockerignore").read_text().splitlines()
+    folders = {place.split("/")[0] for place in PROJECT["tool"]["setuptools"]["package-dir"].values()}
+    assert {f"!{folder}" for folder in folders} <= set(kept)
+
+
 def test_a_release_has_an_address_and_says_what_changed():
     released = "dev" not in springfoot.__version__
     assert not released or not PROJECT["project"]["urls"]["Source"].startswith("https://example.org")
@@ -191,7 +197,10 @@ def test_links_of_the_index_page_lead_to_the_files_of_their_version(version, com
     page = setup.index_page("https://example.org/springfoot", version)
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     back = re.sub(rf"https://example\.org/springfoot/(?:raw|blob)/{commit}/", "", page)
-    assert back == readme and len(links_of(page)) == len(links_of(readme)) > 10
+    assert 'pip install "springfoot[train,live]"' in page and "pip install -e" not in page
+    assert (
+        back.replace('"springfoot[train', '-e ".[train') == readme and len(links_of(page)) == len(links_of(readme)) > 10
+    )
     assert f"](https://example.org/springfoot/blob/{commit}/docs/explanation/design.md" in page
     assert (
         f"![A walk, ground forces as arrows, stiffness as colour](https://example.org/springfoot/raw/{commit}/" in page

@@ -75,7 +75,16 @@ def test_in_a_browser_sliders_set_the_k_that_acts_and_buttons_push_and_restart(c
 
 
 @pytest.mark.parametrize("dark", [False, True])
-@pytest.mark.parametrize(("size", "free"), [((1280, 900), (310, 0, 870, 900)), ((390, 844), (0, 0, 390, 335))])
+@pytest.mark.parametrize(
+    ("size", "free"),
+    [
+        ((1280, 900), (310, 0, 870, 900)),
+        ((1100, 800), (0, 0, 690, 800)),
+        ((768, 1024), (0, 0, 350, 1024)),
+        ((844, 390), (0, 0, 430, 390)),
+        ((390, 844), (0, 0, 390, 335)),
+    ],
+)
 def test_the_body_is_seen_beside_its_panels_on_screen_and_telephone(chromium, view, size, free, dark):
     """`free` is the part of the picture without panels: left, top, right, bottom."""
     told = []
@@ -97,7 +106,7 @@ def test_the_body_is_seen_beside_its_panels_on_screen_and_telephone(chromium, vi
         red, _, blue = np.moveaxis(picture(), -1, 0)
         body = (blue > 1.5 * red) & (blue > 110.0)
         rows = np.flatnonzero(body.any(axis=1))
-        return body.sum() > 2000 and np.ptp(rows) > 120 and rows[-1] < free[3] - free[1] - 20
+        return body.sum() > 600 and np.ptp(rows) > 60 and rows[-1] < free[3] - free[1] - 20
 
     assert reaches(shows_the_body)
     assert reaches(lambda: (np.median(picture()) < 60.0) == dark)
