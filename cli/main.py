@@ -167,7 +167,9 @@ def _run(words: list[str]) -> int:
     except ModuleNotFoundError as error:
         if error.name not in EXTRA_OF:
             raise
-        extra = "train" if words[0] == "train" else ""  # `train` needs all of its extra
+        extra = EXTRA_OF[error.name]
+        if words[0] == "train" and extra == "evaluate":
+            extra = "train"  # `train` needs all of its extra, which brings `evaluate`
         print(f"springfoot {words[0]}: error: {missing(error.name, extra)}", file=sys.stderr)
         return 2
     *others, last = COMMANDS

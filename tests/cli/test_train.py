@@ -15,8 +15,10 @@ import tyro
 
 import train
 from springfoot.agents.policies.policy import read_policy
-from springfoot.agents.training.config import PRESETS, TrainingConfig
+from springfoot.agents.training.config import PRESETS, TrainingConfig, config_to_json
+from springfoot.agents.training.run_record import RLLIB, write_record
 from springfoot.cli import train as train_command
+from springfoot.cli.main import main as springfoot
 from springfoot.envs.settings.settings import THEME_OF, THEMES, BipedSettings, settings_to_json
 from springfoot.studies.base.flags import SettingsFlags, given
 
@@ -242,3 +244,19 @@ def test_ctrl_c_leaves_a_usable_policy_and_a_run_to_go_on_with(tmp_path, number)
         resumed = subprocess.run(again, capture_output=True, text=True)
         assert resumed.returncode == 0, resumed.stderr
         assert json.loads((folder / RUN).read_text())["timesteps"] == done + 1024
+
+
+@pytest.mark.parametrize("flag", ["--out", "--resume"])
+def test_without_ray_rllib_names_the_extra_that_brings_it(monkeypatch, capsys, tmp_path, flag):
+    folder = tmp_path / "far"
+    if flag == "--resume":
+        folder.mkdir()
+        past = {"sessions": [], "evaluations": [], "config": config_to_json(TrainingConfig())}
+        write_record(folder, past | {"engine": {"name": RLLIB, "num_env_runners": 1}})
+    # Python takes a module that is None in `sys.modules` for one that is not there.
+    monkeypatch.setitem(sys.modules, "ray", None)
+    before = sorted(tmp_path.rglob("*"))
+    assert springfoot(["train", "--engine", "rllib", flag, str(folder)]) == 2
+    told = "springfoot train: error: the package ray is missing: pip install 'springfoot[rllib]'\n"
+    assert capsys.readouterr().err == told
+    assert sorted(tmp_path.rglob("*")) == before
