@@ -198,9 +198,15 @@ class _Run:
         """Join or start a Ray cluster until `stack` is closed, and decide the number of runners."""
         # A processor for each runner, and one for this process, which learns.
         stack.enter_context(joined(None if self._runners is None else max(self._runners + 1, processors())))
+        available = int(ray.cluster_resources().get("CPU", 0))
         if self._runners is None:
-            self._runners = max(1, int(ray.cluster_resources().get("CPU", 2)) - 1)
+            self._runners = max(1, available - 1)
         require_count("num_env_runners", self._runners, 0)
+        if self._runners > available:  # RLlib would wait for them without an end
+            raise SpringfootError(
+                f"the Ray cluster has {available} processors, and each runner needs one; "
+                f"num_env_runners must be <= {available}, got {self._runners}"
+            )
         if self._config.num_envs % max(1, self._runners):  # 0 runners: this process collects
             raise SpringfootError(
                 f"num_envs must be a multiple of the {self._runners} runners, got {self._config.num_envs}"

@@ -148,6 +148,16 @@ def test_flags_that_do_not_fit_are_one_line(tmp_path, capsys, words, said):
     assert not (tmp_path / "run").exists()
 
 
+def test_more_runners_than_the_cluster_has_processors_are_refused(cluster, tmp_path, capsys):
+    words = ["--engine", "rllib", "--num-env-runners", "4", "--out", str(tmp_path / "run")]
+    assert train_main(words) == 2
+    assert capsys.readouterr().err.splitlines() == [
+        "train.py: error: the Ray cluster has 3 processors, and each runner needs one; "
+        "num_env_runners must be <= 3, got 4"
+    ]
+    assert not list(tmp_path.iterdir())
+
+
 def test_trainings_of_a_study_run_on_the_nodes_and_again_where_one_dies(cluster, tmp_path):
     from springfoot.agents.training import train_missing
 
