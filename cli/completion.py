@@ -82,7 +82,7 @@ def _script_of_tyro(shell: str, studies: dict[str, Any]) -> str:
 
 
 def _mended(line: re.Match[str]) -> str:
-    """Return the line of the specification with names of policies, and with each description on one line.
+    """Return the line of the specification with names of policies and shells, and with each description on one line.
 
     The scripts take every line that tyro's Python code prints for a word to offer.
     """
@@ -90,14 +90,15 @@ def _mended(line: re.Match[str]) -> str:
     from springfoot.agents.policies.policy import SHIPPED
 
     specification = ast.literal_eval(line[1])
-    for command, names in {
-        "evaluate": (*SHIPPED, *BASELINES),
-        "live": (*SHIPPED, *BASELINES),
-        "export": SHIPPED,
+    for command, (description, names) in {
+        "evaluate": ("policy", (*SHIPPED, *BASELINES)),
+        "live": ("policy", (*SHIPPED, *BASELINES)),
+        "export": ("policy", SHIPPED),
+        "completion": ("shell", get_args(Shell)),
     }.items():
         # Words are offered as the flags of an option are.
-        policies = {"flags": list(names), "description": "policy", "type": "flag"}
-        specification["subcommands"][command]["options"].append(policies)
+        offered = {"flags": list(names), "description": description, "type": "flag"}
+        specification["subcommands"][command]["options"].append(offered)
     _join_lines(specification)
     return f"COMPLETION_SPEC = {specification!r}"
 
@@ -120,6 +121,7 @@ def _all_commands(studies: dict[str, Any]) -> Any:
         module, _, flags = path.partition(".")
         commands[name] = getattr(import_module(f"springfoot.cli.{module}"), flags)
     commands["study"] = make_dataclass("StudyCommand", [("study", _one_of(studies))])
+    commands["completion"] = make_dataclass("CompletionCommand", [])  # it has no flags
     return _one_of(commands)
 
 

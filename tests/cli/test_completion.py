@@ -9,7 +9,7 @@ import pytest
 
 from springfoot.agents.policies.baselines import BASELINES
 from springfoot.agents.policies.policy import SHIPPED
-from springfoot.cli.main import STUDIES, main
+from springfoot.cli.main import COMMANDS, STUDIES, main
 
 OFFER = """
 source "$1"; shift
@@ -34,6 +34,7 @@ def test_bash_offers_commands_studies_and_flags(tmp_path, capsys):
 
     assert {"train", "evaluate", "live", "export", "study"} <= offered("")
     assert offered("ev") == {"evaluate"}
+    assert offered("comp") == {"completion"}
     assert {"--speed", "--speed-range"} <= offered("evaluate", "--spe")
     assert offered("live", "pre") == {"pretrained", "predicted"}
     assert set(STUDIES) <= offered("study", "")
@@ -59,6 +60,9 @@ def test_the_scripts_offer_policies_and_flags_and_no_word_of_a_description(shell
         assert names == {*SHIPPED, *(() if command == "export" else BASELINES)}
         assert all(re.fullmatch(r"--?[\w-]+", word) for word in {*words} - names)
         assert offered(command, "pretr") == ["pretrained"]
+    assert {word for word in offered("") if not word.startswith("-")} == {*COMMANDS}
+    assert {word for word in offered("completion", "") if not word.startswith("-")} == {"bash", "zsh"}
+    assert offered("completion", "b") == ["bash"]
     assert all(word.startswith("-") for word in offered("train", ""))
     assert offered("train", "--preset", "") == ["walk", "any-body", "predict", "person"]
 
