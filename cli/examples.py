@@ -20,7 +20,7 @@ from springfoot.files.writing import is_taken, whole_folder
 
 @dataclass(frozen=True, kw_only=True)
 class ExamplesFlags:
-    """List the programs to start from, examples/learners for other libraries, or copy them."""
+    """List the programs to start from, learners/ for other libraries, or copy them."""
 
     copy: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER", help_behavior_hint="(default: only list them)")] = None
     """New folder for the copies."""
@@ -33,7 +33,7 @@ def examples_main(arguments: Sequence[str], program: str = "springfoot examples"
 
 
 def run_examples(flags: ExamplesFlags) -> None:
-    """Copy the examples if a folder is given; print the path and the first line of each example or copy."""
+    """Copy the examples if a folder is given; print the path of each copy, or its name in it, and its first line."""
     source = Path(str(resources.files("springfoot.examples")))
     files = (path for ending in ("py", "ipynb") for path in source.rglob(f"*.{ending}"))
     programs = [path for path in sorted(files) if path.name != "__init__.py"]
@@ -45,9 +45,10 @@ def run_examples(flags: ExamplesFlags) -> None:
                 copied = folder / path.relative_to(source)
                 copied.parent.mkdir(exist_ok=True)
                 shutil.copyfile(path, copied)
-    shown = flags.copy or Path("examples")
     for path in programs:
-        print(f"{shown / path.relative_to(source)}: {_first_line(path)}")
+        print(f"{(flags.copy or Path()) / path.relative_to(source)}: {_first_line(path)}")
+    if flags.copy is None:
+        print("\nspringfoot examples --copy FOLDER copies them into a new folder.")
 
 
 def _first_line(path: Path) -> str:

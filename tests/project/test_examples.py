@@ -90,6 +90,14 @@ def test_examples_are_copied_out_of_the_package_into_a_new_folder(tmp_path, caps
     assert capsys.readouterr().err == error
 
 
+def test_the_list_names_the_examples_as_they_lie_in_a_copy_and_says_how_to_copy(tmp_path, capsys):
+    assert main(["examples"]) == 0
+    *listed, empty, last = capsys.readouterr().out.splitlines()
+    assert (empty, last) == ("", "springfoot examples --copy FOLDER copies them into a new folder.")
+    assert main(["examples", "--copy", str(tmp_path / "mine")]) == 0
+    assert [f"{tmp_path / 'mine'}/{line}" for line in listed] == capsys.readouterr().out.splitlines()
+
+
 MISSING = {
     "clone_from_minari.py": ("minari", "'springfoot[minari]'"),
     "plot_schedule.py": ("matplotlib", "'springfoot[evaluate]'"),
