@@ -50,4 +50,4 @@ def run_datasets(flags: DatasetsFlags) -> None:
         for name, row in summaries.items()
     ]
     print(table(["set", "episodes", "steps", "mean return", "falls"], rows))
-    print(f'\nNext:    python -c "import minari; print(minari.load_dataset({set_id(flags.sets[0])!r}))"')
+    print(f'\nNext:    python -c "import minari; print(minari.load_dataset({set_id(flags.sets[0])!r}).total_episodes)"')

@@ -1,6 +1,7 @@
 """Minari's sets hold what a learner sees of a walk: the environment that they name gives the same bits again."""
 
 import os
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -64,6 +65,14 @@ def test_a_set_that_exists_is_kept(folder, capsys):
     assert list(minari.list_local_datasets()) == ["springfoot/walk/random-v0"]
     with pytest.raises(SpringfootError, match="exists already"):
         write_sets(["random"], 1)
+
+
+def test_the_command_to_type_next_prints_the_number_of_episodes(folder, capsys):
+    assert main(["datasets", "--sets", "random", "--episodes", "2"]) == 0
+    last = capsys.readouterr().out.splitlines()[-1]
+    assert last.startswith("Next:    python -c ")
+    words = [sys.executable, *shlex.split(last.removeprefix("Next:"))[1:]]
+    assert subprocess.run(words, capture_output=True, text=True).stdout == "2\n"
 
 
 def test_a_set_that_cannot_be_finished_leaves_nothing(folder, monkeypatch):
