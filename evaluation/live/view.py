@@ -87,7 +87,7 @@ class LiveView:
         self._dark: set[int] = set()  # numbers of the browsers whose page is dark
         self._curves: dict[int, dict[str, Any]] = {}  # number of a browser -> its charts
         self._server.on_client_connect(self._welcome)
-        self._server.on_client_disconnect(lambda client: self._curves.pop(client.client_id, None))
+        self._server.on_client_disconnect(self._forget)
         self.address = f"http://{host}:{self._server.get_port()}"
         """Address of the page."""
         self.frames = 0
@@ -171,6 +171,10 @@ class LiveView:
         """Fit the page of a new browser to its size: camera, and curves beside the body or below the inputs."""
         fit_to_screen(client)
         self._curves[client.client_id] = _add_curves(client.gui, wide=client.camera.image_width >= WIDE)
+
+    def _forget(self, client: viser.ClientHandle) -> None:
+        """Send no more curves to a browser that left."""
+        self._curves.pop(client.client_id, None)
 
     def _turn_theme(self, client: viser.ClientHandle | None) -> None:
         """Turn the page of one browser dark, or light again; others keep theirs."""
