@@ -44,6 +44,32 @@ def joined(processors: int | None = None) -> Iterator[None]:
         ray.shutdown()
 
 
+@contextmanager
+def ending_waits() -> Iterator[None]:
+    """Have SIGTERM end a wait inside Ray too, which heeds only KeyboardInterrupt, and then do what it did before."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.getsignal(signal.SIGTERM)
+    asked = False
+
+    def interrupt(_number: int, _frame: object) -> None:
+        nonlocal asked
+        asked = True
+        raise KeyboardInterrupt
+
+    signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield
+    except KeyboardInterrupt:
+        signal.signal(signal.SIGTERM, before)
+        if asked:
+            signal.raise_signal(signal.SIGTERM)
+        raise
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
 def run_on_ray(commands: Sequence[tuple[str, list[str]]]) -> None:
     """Run commands (name, words), each on one processor of the cluster; print the standard error of each as it ends,
     its name before every line.

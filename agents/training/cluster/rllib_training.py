@@ -42,7 +42,7 @@ from ..progress import Progress
 from ..returns import evaluation_of
 from ..run_record import RLLIB, best_of, is_of_rllib, read_record, require_past, write_record
 from ..stopping import Stopping
-from .nodes import joined
+from .nodes import ending_waits, joined
 from .rllib_network import OBSERVATION_CLIP, ActorCritic, actor_layers
 
 PACKAGES = ("springfoot", "mujoco", "gymnasium", "numpy", "scipy", "torch", "ray")
@@ -173,7 +173,8 @@ class _Run:
         """Train until the configured timesteps are done or a signal stops it; return the record."""
         with ExitStack() as stack:
             self._connect(stack)
-            self._algorithm = self._build()
+            with ending_waits():
+                self._algorithm = self._build()
             stack.callback(shutil.rmtree, self._algorithm.logdir, ignore_errors=True)  # Ray's, empty
             stack.callback(self._algorithm.stop)
             if self._checkpoint is not None:

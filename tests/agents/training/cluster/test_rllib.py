@@ -32,10 +32,10 @@ SMALL = TrainingConfig(timesteps=8192, num_envs=8, update_steps=1024, eval_inter
 
 @pytest.fixture
 def cluster():
-    """A Ray cluster of three nodes on this machine: one for the learner, two with a processor each for runners."""
+    """A Ray cluster of three nodes on this machine: one without a processor for the learner, two with one each."""
     from ray.cluster_utils import Cluster  # pyright: ignore[reportMissingImports]
 
-    made = Cluster(initialize_head=True, head_node_args={"num_cpus": 1})
+    made = Cluster(initialize_head=True, head_node_args={"num_cpus": 0})
     made.nodes = [made.add_node(num_cpus=1), made.add_node(num_cpus=1)]
     ray.init(address=made.address, log_to_driver=False, logging_level="ERROR")
     yield made
@@ -152,9 +152,26 @@ def test_more_runners_than_the_cluster_has_processors_are_refused(cluster, tmp_p
     words = ["--engine", "rllib", "--num-env-runners", "4", "--out", str(tmp_path / "run")]
     assert train_main(words) == 2
     assert capsys.readouterr().err.splitlines() == [
-        "train.py: error: the Ray cluster has 3 processors, and each runner needs one; "
-        "num_env_runners must be <= 3, got 4"
+        "train.py: error: the Ray cluster has 2 processors, and each runner needs one; "
+        "num_env_runners must be <= 2, got 4"
     ]
+    assert not list(tmp_path.iterdir())
+
+
+def test_sigterm_ends_the_wait_for_processors_that_others_use(cluster, tmp_path):
+    class Other:
+        def begin(self): ...
+
+    others = [ray.remote(num_cpus=1)(Other).remote() for _ in range(2)]
+    ray.get([other.begin.remote() for other in others])
+    words = ["--engine", "rllib", "--num-env-runners", "1", "--out", str(tmp_path / "run")]
+    command = [sys.executable, "-c", "import sys; from springfoot.cli.main import main; sys.exit(main())", "train"]
+    process = subprocess.Popen([*command, *words], env=os.environ | {"RAY_ADDRESS": cluster.address})
+    while not any(actor["State"] == "PENDING_CREATION" for actor in ray._private.state.actors().values()):
+        assert process.poll() is None
+        time.sleep(0.2)
+    process.send_signal(signal.SIGTERM)
+    assert process.wait(120) == 143
     assert not list(tmp_path.iterdir())
 
 
