@@ -1,7 +1,8 @@
 """Train with RLlib's PPO where one machine is not enough: runners on a Ray cluster collect, this process learns.
 
 A run has the folder of any other training: policies, `run.json`, TensorBoard's events. Its checkpoints `ray-N` after N
-steps are Ray's own, and hold pickles: continue only runs of your own. A runner that dies is started again by RLlib.
+steps are Ray's own, and hold pickles: continue only runs of your own. A runner that dies is started again by RLlib;
+`healthy_runners` and `restarted_runners` of a session in `run.json` tell how many collect now and were started again.
 """
 
 import dataclasses
@@ -281,9 +282,17 @@ class _Run:
             before = self._trained
             self._trained = int(collected["num_env_steps_sampled_lifetime"])
             self._progress.advance(self._trained - before)
-            for name in ("episode_return_mean", "num_healthy_workers"):
-                if np.isfinite(collected.get(name, np.nan)):
-                    self._writer.add_scalar(f"rllib/{name}", float(collected[name]), self._trained)
+            runners = result["fault_tolerance"]
+            told = {
+                "episode_return_mean": collected.get("episode_return_mean", np.nan),
+                "healthy_runners": runners["num_healthy_workers"],
+                "restarted_runners": runners["num_remote_worker_restarts"],
+            }
+            for name, value in told.items():
+                if np.isfinite(value):
+                    self._writer.add_scalar(f"rllib/{name}", float(value), self._trained)
+            session = self._record["sessions"][-1]
+            session |= {name: int(told[name]) for name in ("healthy_runners", "restarted_runners")}
         if not self._stopping.asked and not self._finished:
             self._evaluate()
         self._keep()

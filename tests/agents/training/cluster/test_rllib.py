@@ -8,8 +8,8 @@ import os
 import signal
 import subprocess
 import sys
-import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -28,6 +28,7 @@ from springfoot.agents.training.cluster import rllib_training  # noqa: E402
 
 pytestmark = pytest.mark.filterwarnings("ignore")  # Ray's own
 SMALL = TrainingConfig(timesteps=8192, num_envs=8, update_steps=1024, eval_interval=4096, eval_episodes=2)
+TRAIN = [sys.executable, "-c", "import sys; from springfoot.cli.main import main; sys.exit(main())", "train"]
 
 
 @pytest.fixture
@@ -85,27 +86,33 @@ def test_the_first_policy_is_the_mean_action_of_the_untrained_network(tmp_path):
 
 
 def test_a_killed_node_and_its_runner_are_replaced(cluster, tmp_path):
-    def kill():
-        while not list((tmp_path / "run").glob("ray-*")):
-            time.sleep(0.1)
-        cluster.add_node(num_cpus=1)
-        cluster.remove_node(cluster.nodes[0], allow_graceful=False)
+    out = tmp_path / "run"
+    words = ["--engine", "rllib", "--num-env-runners", "2", "--timesteps", "1000000", "--num-envs", "8"]
+    words += ["--update-steps", "1024", "--eval-interval", "4096", "--eval-episodes", "2", "--out", str(out)]
+    process = subprocess.Popen([*TRAIN, *words], env=os.environ | {"RAY_ADDRESS": cluster.address})
 
-    killer = threading.Thread(target=kill, daemon=True)
-    killer.start()
-    config = dataclasses.replace(SMALL, timesteps=40_960)
-    record = rllib_training.train(config, tmp_path / "run", 2)
-    killer.join(1.0)
-    assert not killer.is_alive()
-    assert record["status"] == "finished" and record["timesteps"] >= config.timesteps
+    def wait_for_runners(restarted):
+        session = {}
+        while (session.get("healthy_runners"), session.get("restarted_runners")) != (2, restarted):
+            assert process.poll() is None
+            time.sleep(0.2)
+            if (out / "run.json").is_file():
+                (session,) = read_record(out)["sessions"]
+
+    wait_for_runners(0)
+    cluster.remove_node(cluster.nodes[0], allow_graceful=False)
+    cluster.add_node(num_cpus=1)
+    wait_for_runners(1)
+    process.send_signal(signal.SIGINT)
+    assert process.wait() == 130
+    assert load_policy(out).settings == PRESETS["walk"].environment
 
 
 def test_a_run_that_is_killed_altogether_goes_on(tmp_path):
     out = tmp_path / "run"
     words = ["--engine", "rllib", "--num-env-runners", "1", "--timesteps", "400000", "--num-envs", "8"]
     words += ["--update-steps", "1024", "--eval-interval", "4096", "--eval-episodes", "2"]
-    command = [sys.executable, "-c", "import sys; from springfoot.cli.main import main; sys.exit(main())", "train"]
-    process = subprocess.Popen([*command, "--out", str(out), *words], start_new_session=True)
+    process = subprocess.Popen([*TRAIN, "--out", str(out), *words], start_new_session=True)
     while not list(out.glob("ray-[1-9]*")):
         assert process.poll() is None
         time.sleep(0.2)
@@ -122,8 +129,7 @@ def test_a_run_that_is_killed_altogether_goes_on(tmp_path):
 def test_the_first_ctrl_c_leaves_a_run_that_goes_on(tmp_path):
     out = tmp_path / "run"
     words = ["--engine", "rllib", "--num-env-runners", "1", "--timesteps", "4000000", "--out", str(out)]
-    command = [sys.executable, "-c", "import sys; from springfoot.cli.main import main; sys.exit(main())", "train"]
-    process = subprocess.Popen([*command, *words], start_new_session=True)
+    process = subprocess.Popen([*TRAIN, *words], start_new_session=True)
     while not list(out.glob("ray-*")):
         assert process.poll() is None
         time.sleep(0.2)
@@ -165,8 +171,7 @@ def test_sigterm_ends_the_wait_for_processors_that_others_use(cluster, tmp_path)
     others = [ray.remote(num_cpus=1)(Other).remote() for _ in range(2)]
     ray.get([other.begin.remote() for other in others])
     words = ["--engine", "rllib", "--num-env-runners", "1", "--out", str(tmp_path / "run")]
-    command = [sys.executable, "-c", "import sys; from springfoot.cli.main import main; sys.exit(main())", "train"]
-    process = subprocess.Popen([*command, *words], env=os.environ | {"RAY_ADDRESS": cluster.address})
+    process = subprocess.Popen([*TRAIN, *words], env=os.environ | {"RAY_ADDRESS": cluster.address})
     while not any(actor["State"] == "PENDING_CREATION" for actor in ray._private.state.actors().values()):
         assert process.poll() is None
         time.sleep(0.2)
@@ -180,16 +185,14 @@ def test_trainings_of_a_study_run_on_the_nodes_and_again_where_one_dies(cluster,
 
     jobs = [(dataclasses.replace(SMALL, seed=k, timesteps=20_480), tmp_path / f"seed-{k}", f"seed {k}") for k in (0, 1)]
 
-    def kill():
+    with ThreadPoolExecutor() as pool:  # nodes are added in the main thread, as Ray asks for it
+        trained = pool.submit(train_missing, jobs, "ray")
         while not all(list(folder.glob("state-*")) for _, folder, _ in jobs):
+            assert not trained.done()
             time.sleep(0.1)
-        cluster.add_node(num_cpus=1)
         cluster.remove_node(cluster.nodes[0], allow_graceful=False)
-
-    killer = threading.Thread(target=kill, daemon=True)
-    killer.start()
-    assert train_missing(jobs, "ray") == "finished"
-    killer.join(1.0)
-    assert not killer.is_alive()
-    for _, folder, _ in jobs:
-        assert read_record(folder)["timesteps"] >= 20_480
+        cluster.add_node(num_cpus=1)
+        assert trained.result() == "finished"
+    records = [read_record(folder) for _, folder, _ in jobs]
+    assert all(record["timesteps"] >= 20_480 for record in records)
+    assert sorted(len(record["sessions"]) for record in records) == [1, 2]  # one had begun on the killed node
