@@ -23,10 +23,10 @@ from springfoot.evaluation.numbers import measure
 from springfoot.evaluation.recording import Recording
 from springfoot.files.markdown import MISSING, table, text_of
 
+from ..base.condition_walks import ConditionWalks
 from ..base.kept import Kept
 from ..base.study import Answer, OnProgress, WalkingStudy
 from .both_feet import both, braced
-from .condition_walks import ConditionWalks
 from .walked_speeds import TWO_PRICES, Row, at_walked_speeds, lowest, price_numbers, rows_csv
 
 ASKED_SPEEDS = (0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6)

@@ -43,8 +43,8 @@ def highest(curve: NDArray, spread: NDArray, tick: float) -> tuple[float, float]
 
 def lowest(curve: NDArray, spread: NDArray, tick: float) -> tuple[float, float]:
     """Return the lowest value and the spread there."""
-    at = int(np.argmin(curve))
-    return float(curve[at]), float(spread[at])
+    value, there = highest(-curve, spread, tick)
+    return -value, there
 
 
 def extent(curve: NDArray, spread: NDArray, tick: float) -> tuple[float, float]:
@@ -69,11 +69,11 @@ class Quantity:
     """A number of a stride's mean curves."""
 
     label: str
-    """What it is, with its unit."""
+    """Its name and unit."""
     curve: str
     """The curve that it is of, a key of `COLUMNS`."""
     measure: Measure
-    """How it is measured."""
+    """Function that measures it."""
     part: tuple[int, int] = (0, 100)
     """Part of the stride that counts [%]."""
 

@@ -9,8 +9,8 @@ from springfoot.envs import BipedSettings
 from springfoot.envs.settings import FOOT_SETTINGS
 from springfoot.evaluation.recording import Recording, policy_and_settings, record_feet
 
-from ..base.kept import Kept
-from ..base.study import OnProgress, WalkingStudy
+from .kept import Kept
+from .study import OnProgress, WalkingStudy
 
 
 @dataclass(frozen=True, kw_only=True)
