@@ -1,14 +1,19 @@
 """The price of the muscles in a simulated walk: against every physics step, part by part, and with planted devices."""
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pytest
 
 from springfoot.envs import Biped
-from springfoot.envs.physics.foot import SOUND
+from springfoot.envs.physics import foot as physics_foot
+from springfoot.envs.physics.foot import LOCK, SOUND
 from springfoot.envs.physics.model import ANKLE, JOINTS, RIGHT, SIDES, TOE, passive_damping
 from springfoot.envs.physics.muscles import leg_strengths, muscles_of
 from springfoot.envs.physics.timing import PHYSICS_STEP, PHYSICS_STEPS_PER_WINDOW
+from springfoot.envs.settings import feet as settings_feet
+from springfoot.envs.settings.feet import RIGID_TOE_STIFFNESS
 from springfoot.envs.settings.settings import body_of, settings_from
 from springfoot.envs.task.reward import TERMS
 from springfoot.evaluation.numbers import measure
@@ -138,10 +143,12 @@ def test_parts_of_the_work_make_up_that_of_the_joint(name, given):
     angle, work = series["angle"], series["joint_work"][1:].sum(-1)
     turn, middle = np.diff(angle, axis=0), 0.5 * (angle[1:] + angle[:-1])
     moment = series["fibre_moment"][1:]
-    give = np.array(TENDON_GIVE) / body.stiffness_scale
     pull = np.maximum(moment, 0.0)
-    tendon = (pull[1:-1] * 0.5 * (pull[2:] - pull[:-2]) * give).sum(0)
-    fibres = series["muscle_work"][2:-1].sum((0, -1)) + tendon
+    # What a tendon holds at the end and did not at the start, F^2 / 2 k, from the fibres' force between two windows.
+    stored = 0.5 * pull[:-1] * pull[1:] * np.array(TENDON_GIVE) / body.stiffness_scale
+    tendon = stored[0] - stored[-1]
+    strength = leg_strengths(body, settings.feet)
+    fibres = muscle_use(moment, series["muscle_work"][1:], TICK, strength, body.stiffness_scale).work.sum(-1)
     tissue = -(passive_moments(body, middle) * turn)[1:-1].sum(0)
     damping = -(passive_damping(body) * turn**2 / TICK)[1:-1].sum(0)
     orthosis = settings.right_foot.foot.ankle.orthosis
@@ -150,10 +157,13 @@ def test_parts_of_the_work_make_up_that_of_the_joint(name, given):
         beta = 0.0 if orthosis.engages else 0.02 * np.sqrt(body.length_scale)
         brace = orthosis.stiffness * (np.clip(middle, *orthosis.slack) - middle - beta * turn / TICK) * turn
         device[RIGHT, ANKLE] = brace[1:-1, RIGHT, ANKLE].sum()
-    parts = fibres - tendon + tissue + damping + device
+    parts = fibres + tendon + tissue + damping + device
     whole = work[1:-1].sum(0)
     size = np.abs(series["joint_work"][1:]).sum((0, -1))
     np.testing.assert_allclose(parts, whole, rtol=0, atol=0.01 * size.max())
+    np.testing.assert_allclose(
+        series["muscle_work"][2:-1].sum((0, -1)), fibres + tendon, rtol=0, atol=1e-4 * size.max()
+    )
     assert np.abs(tendon).max() < 0.02 * size.max()  # a tendon stores and returns
 
 
@@ -185,16 +195,27 @@ def test_a_weak_calf_has_its_share_of_the_strength():
     np.testing.assert_array_equal(left[:ANKLE], right[:ANKLE])
 
 
-def test_effort_per_kg_does_not_depend_on_mass_if_devices_scale_with_it():
-    def effort(mass):
-        scale = mass / 63.0
-        brace = {"kind": "intact", "orthosis": {"ankle_stiffness": 150.0 * scale}}
-        act, settings = policy_and_settings("schedule", {"episode_seconds": 6.0, "mass": mass, "right_foot": brace})
-        return measure(record(act, settings, name="schedule", episodes=1)).metrics["effort"]
+@pytest.mark.parametrize("kind", ["braced", "passive", "rigid", "rigid_toe"])
+def test_effort_per_kg_does_not_depend_on_mass_if_devices_scale_with_it(kind, monkeypatch):
+    def effort(scale):
+        foot = {
+            "braced": {"kind": "intact", "orthosis": {"ankle_stiffness": 150.0 * scale}},
+            "passive": {"kind": "passive", "ankle_stiffness": 400.0 * scale, "toe_stiffness": 60.0 * scale},
+        }.get(kind, kind)
+        # A lock and the rigid foot's toe have no settings.
+        for module in (physics_foot, settings_feet):
+            monkeypatch.setattr(module, "LOCK", replace(LOCK, stiffness=LOCK.stiffness * scale))
+        monkeypatch.setattr(settings_feet, "RIGID_TOE_STIFFNESS", RIGID_TOE_STIFFNESS * scale)
+        given = {"episode_seconds": 6.0, "mass": 63.0 * scale, "right_foot": foot}
+        act, settings = policy_and_settings("learned", given)
+        return measure(record(act, settings, name="learned", episodes=1)).metrics["effort"]
 
-    own, other = effort(63.0), effort(63.0 * 1.3)
+    own, other = effort(1.0), effort(1.3)
     for name in ("fibre_J_kg_m", "net_joint_J_kg_m", "activation", "total"):
         assert other[name] == pytest.approx(own[name], rel=1e-5), name
+
+
+def test_fibres_pay_four_times_what_they_do_and_less_than_what_is_done_on_them():
     assert metabolic_energy(np.array([1.0, -1.2])) == pytest.approx([4.0, 1.0])
 
 
