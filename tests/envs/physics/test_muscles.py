@@ -2,16 +2,15 @@
 
 from dataclasses import replace
 
-import mujoco
 import numpy as np
 import pytest
 
+from benchmarks.cheating import finely_used, replayed
 from springfoot.envs import Biped
 from springfoot.envs.physics import foot as physics_foot
 from springfoot.envs.physics.foot import LOCK, SOUND
-from springfoot.envs.physics.model import ANKLE, JOINTS, RIGHT, SIDES, TOE, passive_damping
+from springfoot.envs.physics.model import ANKLE, JOINTS, RIGHT, TOE, passive_damping
 from springfoot.envs.physics.muscles import leg_strengths, muscles_of
-from springfoot.envs.physics.timing import PHYSICS_STEP, PHYSICS_STEPS_PER_WINDOW
 from springfoot.envs.settings import feet as settings_feet
 from springfoot.envs.settings.feet import RIGID_TOE_STIFFNESS
 from springfoot.envs.settings.settings import body_of, settings_from
@@ -42,30 +41,6 @@ DEVICES = (
 )
 
 
-def replayed(biped, act, windows):
-    """Return torque of the actuators (T, side, joint) and angle (T + 1, side, joint) of every physics step, and the
-    ticks."""
-    replay, controls, ticks = biped.data(0), [], []
-
-    def keep(tick):
-        ticks.append(tick)
-        controls.append(biped.data(0).ctrl.copy())
-
-    biped.on_tick = keep
-    observation = biped.observe()
-    for _ in range(windows // biped.windows_per_step):
-        observation = biped.step(act(observation)).observation
-    torque, angle = [], [replay.qpos[3:].copy()]
-    for control in controls:
-        replay.ctrl[:] = control
-        for _ in range(PHYSICS_STEPS_PER_WINDOW):
-            mujoco.mj_step(biped.model, replay)
-            torque.append(replay.qfrc_actuator[3:].copy())
-            angle.append(replay.qpos[3:].copy())
-    shape = -1, len(SIDES), len(JOINTS)
-    return np.reshape(torque, shape), np.reshape(angle, shape), ticks
-
-
 @pytest.mark.parametrize(
     ("name", "given"),
     [
@@ -80,21 +55,10 @@ def test_windows_price_a_walk_as_steps_of_2_ms_with_the_same_smooth_force_do(nam
     act, settings = policy_and_settings(name, {"episode_seconds": 7.0, **given})
     biped, windows = Biped(settings, 1), 600
     biped.reset(np.array([0]), [0])
-    torque, angle, ticks = replayed(biped, act, windows)
-    turn = np.diff(angle, axis=0)
-    fibres = -torque - passive_moments(biped.body, 0.5 * (angle[1:] + angle[:-1]))
-    # Rest angles are held for 10 ms, so torques of single steps are saw teeth around the muscles' force.
-    mean = fibres.reshape(windows, PHYSICS_STEPS_PER_WINDOW, *fibres.shape[1:]).mean(1)
-    step = np.arange(len(fibres)) + 0.5
-    window = PHYSICS_STEPS_PER_WINDOW * (np.arange(windows) + 0.5)
-    smooth = np.stack([np.interp(step, window, curve) for curve in mean.reshape(windows, -1).T], -1)
-    smooth = smooth.reshape(fibres.shape)
-    half = -smooth * turn / 2
-    strength = leg_strengths(biped.body, settings.feet)
-    scale = biped.body.stiffness_scale
-    fine = muscle_use(smooth, np.stack([half, half], -1), PHYSICS_STEP, strength, scale)
+    torque, angle, ticks, _ = replayed(biped, act, windows)
+    fine = finely_used(biped, torque, angle, windows)
     kept = np.stack([tick.fibre_moment[0] for tick in ticks]), np.stack([tick.muscle_work[0] for tick in ticks])
-    own = muscle_use(*kept, TICK, strength, scale)
+    own = muscle_use(*kept, TICK, leg_strengths(biped.body, settings.feet), biped.body.stiffness_scale)
     assert own.energy.sum() == pytest.approx(fine.energy.sum(), rel=0.025)
     assert own.activation.sum() == pytest.approx(fine.activation.sum(), rel=0.02)
 
