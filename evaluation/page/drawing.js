@@ -65,7 +65,7 @@ function frame(parent, title, xUnit, yUnit, xs, ys) {
 const PERCENT = Array.from({ length: 101 }, (_, k) => k);
 const followers = []; // each is told where in the stride and the step we are, and draws its cursor there
 // What is drawn of the policies in one panel: a line each, or where its feet differ one for the left leg and a finer, paler one for the right.
-const lines = which => which.flatMap((p, i) => (p.legs || [p]).map((own, leg) => ({ ...own, of: i, leg, side: p.legs ? ["left", "right"][leg] : "", name: [policies[i].name, ...(p.legs ? [["left", "right"][leg]] : [])].join(" "), shade: colour(i), dash: dash(i), width: leg ? 1.2 : 1.9, opacity: leg ? .6 : 1 })));
+const lines = which => which.flatMap((p, i) => (p.legs || [p]).map((own, leg) => ({ ...own, of: i, leg, name: [policies[i].name, ...(p.legs ? [["left", "right"][leg]] : [])].join(" "), shade: colour(i), dash: dash(i), width: leg ? 1.2 : 1.9, opacity: leg ? .6 : 1 })));
 // Which policy alone is shown, by its number; null for all. Whatever belongs to one has data-of.
 let only = null;
 const isShown = p => only === null || p.of === only;
@@ -94,12 +94,12 @@ function panel(parent, which) {
   const upright = name => draw(svg, "line", { y1: TOP, y2: HEIGHT - BOTTOM, stroke: "var(--ink)", "stroke-width": 1, class: name, visibility: "hidden" });
   const line = upright("cursor"), pointer = upright("pointer");
   const dots = drawn.map(p => draw(svg, "circle", { r: 3.5, fill: p.shade, "fill-opacity": p.opacity, stroke: "var(--paper)", class: "dot", "data-of": p.of }));
-  // Values stand below the drawing, where they have lines enough, each with its policy's colour and, of unlike legs, its side.
+  // Values stand below the drawing, where they have lines enough, each with its policy's colour.
   const note = make(svg.parentElement, "div", undefined, { class: "value" });
   const tell = (begin, texts, end) => {
     note.replaceChildren();
     if (begin) make(note, "span", begin);
-    drawn.forEach((p, i) => { if (isShown(p)) make(note, "span", `${p.side} ${texts[i]}`.trim(), { class: "own", style: `border-color:${p.shade}` }); });
+    drawn.forEach((p, i) => { if (isShown(p)) make(note, "span", texts[i], { class: "own", style: `border-color:${p.shade}` }); });
     if (end) make(note, "span", end);
   };
   let following = () => {};

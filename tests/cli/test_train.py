@@ -9,7 +9,6 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from runpy import run_path
 
 import pytest
 import tyro
@@ -261,13 +260,3 @@ def test_without_ray_rllib_names_the_extra_that_brings_it(monkeypatch, capsys, t
     told = "springfoot train: error: the package ray is missing: pip install 'springfoot[rllib]'\n"
     assert capsys.readouterr().err == told
     assert sorted(tmp_path.rglob("*")) == before
-
-
-def test_the_clones_train_py_names_a_missing_extra_in_one_line_too(monkeypatch, capsys, tmp_path):
-    monkeypatch.setitem(sys.modules, "ray", None)
-    monkeypatch.setattr(sys, "argv", ["train.py", "--engine", "rllib", "--out", str(tmp_path / "far")])
-    with pytest.raises(SystemExit) as ended:
-        run_path(str(SCRIPT), run_name="__main__")
-    assert ended.value.code == 2
-    assert capsys.readouterr().err == "train.py: error: the package ray is missing: pip install 'springfoot[rllib]'\n"
-    assert not list(tmp_path.iterdir())

@@ -44,15 +44,6 @@ def joined(processors: int | None = None) -> Iterator[None]:
         ray.shutdown()
 
 
-def tell_of_wait(processors: int, purpose: str) -> None:
-    """Print one line on standard error if fewer than that many processors of the cluster are free: Ray waits for them
-    without a word."""
-    free = int(ray.available_resources().get("CPU", 0))
-    if free < processors:
-        plural = "s" if processors > 1 else ""
-        print(f"waiting for {processors} processor{plural} of the Ray cluster {purpose}; {free} free", file=sys.stderr)
-
-
 @contextmanager
 def ending_waits() -> Iterator[None]:
     """Have SIGTERM end a wait inside Ray too, which heeds only KeyboardInterrupt, and then do what it did before."""
@@ -86,7 +77,6 @@ def run_on_ray(commands: Sequence[tuple[str, list[str]]]) -> None:
     Raises `KeyboardInterrupt` after a signal, with the commands ended.
     """
     with joined():
-        tell_of_wait(1, "to begin")
         task = ray.remote(num_cpus=1, max_retries=MOST_RETRIES)(_run)
         names = {task.remote(words, os.getcwd()): name for name, words in commands}
         waiting = list(names)

@@ -43,7 +43,7 @@ from ..progress import Progress
 from ..returns import evaluation_of
 from ..run_record import RLLIB, best_of, is_of_rllib, read_record, require_past, write_record
 from ..stopping import Stopping
-from .nodes import ending_waits, joined, tell_of_wait
+from .nodes import ending_waits, joined
 from .rllib_network import OBSERVATION_CLIP, ActorCritic, actor_layers
 
 PACKAGES = ("springfoot", "mujoco", "gymnasium", "numpy", "scipy", "torch", "ray")
@@ -213,7 +213,6 @@ class _Run:
             raise SpringfootError(
                 f"num_envs must be a multiple of the {self._runners} runners, got {self._config.num_envs}"
             )
-        tell_of_wait(self._runners, "for the runners")
 
     def _build(self) -> Any:
         """Return RLlib's PPO with the configuration's numbers."""

@@ -25,7 +25,6 @@ from springfoot.errors import SpringfootError
 ray = pytest.importorskip("ray", reason="RLlib has an environment of its own: make test-rllib")
 
 from springfoot.agents.training.cluster import rllib_training  # noqa: E402
-from springfoot.agents.training.cluster.nodes import joined, tell_of_wait  # noqa: E402
 
 pytestmark = pytest.mark.filterwarnings("ignore")  # Ray's own
 SMALL = TrainingConfig(timesteps=8192, num_envs=8, update_steps=1024, eval_interval=4096, eval_episodes=2)
@@ -196,20 +195,3 @@ def test_trainings_of_a_study_run_on_the_nodes_and_again_where_one_dies(cluster,
         assert trained.result() == "finished"
     assert all(read_record(folder)["timesteps"] >= 20_480 for _, folder, _ in jobs)
     assert capsys.readouterr().err.count("taken over from") == 1  # the one that had begun on the killed node
-
-
-def test_a_wait_for_busy_processors_is_told(monkeypatch, capsys):
-    monkeypatch.delenv("RAY_ADDRESS", raising=False)
-    with joined(1):
-        tell_of_wait(1, "to begin")
-        assert capsys.readouterr().err == ""
-        running = ray.remote(num_cpus=1)(lambda: time.sleep(60)).remote()
-        end = time.monotonic() + 30
-        while ray.available_resources().get("CPU", 0) and time.monotonic() < end:
-            time.sleep(0.1)
-        tell_of_wait(1, "to begin")
-        tell_of_wait(2, "for the runners")
-        told = "waiting for {} of the Ray cluster {}; 0 free\n"
-        expected = told.format("1 processor", "to begin") + told.format("2 processors", "for the runners")
-        assert capsys.readouterr().err == expected
-        ray.cancel(running, force=True)
