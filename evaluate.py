@@ -2,14 +2,16 @@
 
 import sys
 
+from springfoot.extras import exiting_if_missing
 from springfoot.terminal import at_terminal
 
 
 def main() -> int:
     """Evaluate; Ctrl-C and SIGTERM end it even while its imports run."""
-    from springfoot.cli.evaluate import evaluate_main
+    with exiting_if_missing():
+        from springfoot.cli.evaluate import evaluate_main
 
-    return evaluate_main()
+        return evaluate_main()
 
 
 if __name__ == "__main__":

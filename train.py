@@ -2,14 +2,16 @@
 
 import sys
 
+from springfoot.extras import exiting_if_missing
 from springfoot.terminal import at_terminal
 
 
 def main() -> int:
     """Train; Ctrl-C and SIGTERM end it even while its imports run."""
-    from springfoot.cli.train import train_main
+    with exiting_if_missing():
+        from springfoot.cli.train import train_main
 
-    return train_main()
+        return train_main()
 
 
 if __name__ == "__main__":

@@ -259,4 +259,9 @@ def test_without_ray_rllib_names_the_extra_that_brings_it(monkeypatch, capsys, t
     assert springfoot(["train", "--engine", "rllib", flag, str(folder)]) == 2
     told = "springfoot train: error: the package ray is missing: pip install 'springfoot[rllib]'\n"
     assert capsys.readouterr().err == told
+    hidden = "import runpy, sys; sys.modules['ray'] = None; script = sys.argv.pop(1); sys.argv[0] = script; "
+    hidden += "runpy.run_path(script, run_name='__main__')"
+    words = [sys.executable, "-c", hidden, SCRIPT, "--engine", "rllib", flag, str(folder)]
+    done = subprocess.run(words, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (2, told.replace("springfoot train", "train.py"))
     assert sorted(tmp_path.rglob("*")) == before
