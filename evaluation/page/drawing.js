@@ -94,12 +94,12 @@ function panel(parent, which) {
   const upright = name => draw(svg, "line", { y1: TOP, y2: HEIGHT - BOTTOM, stroke: "var(--ink)", "stroke-width": 1, class: name, visibility: "hidden" });
   const line = upright("cursor"), pointer = upright("pointer");
   const dots = drawn.map(p => draw(svg, "circle", { r: 3.5, fill: p.shade, "fill-opacity": p.opacity, stroke: "var(--paper)", class: "dot", "data-of": p.of }));
-  // Values stand below the drawing, where they have lines enough, each with its policy's colour.
+  // Values stand below the drawing, where they have lines enough, each with its line's colour.
   const note = make(svg.parentElement, "div", undefined, { class: "value" });
   const tell = (begin, texts, end) => {
     note.replaceChildren();
     if (begin) make(note, "span", begin);
-    drawn.forEach((p, i) => { if (isShown(p)) make(note, "span", texts[i], { class: "own", style: `border-color:${p.shade}` }); });
+    drawn.forEach((p, i) => { if (isShown(p)) make(note, "span", texts[i], { class: "own", style: `border-color:${p.shade}${Math.round(255 * p.opacity).toString(16)}` }); });
     if (end) make(note, "span", end);
   };
   let following = () => {};

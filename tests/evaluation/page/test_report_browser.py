@@ -205,8 +205,30 @@ def test_feet_are_drawn_by_what_they_are(chromium, page):
     assert shown == ["visible", "hidden", "visible", "visible"]  # a foot of one piece has no toe joint
     assert "left foot rigid toe (in an orthosis" in tab.locator("figcaption").nth(1).inner_text()
     assert "locked" in body.text_content()
-    knee = tab.locator("svg[aria-label^='Knee angle'] .mean")
-    assert knee.count() == 3  # one policy, and both legs of the other
+    knee = tab.locator("svg[aria-label^='Knee angle']")
+    lines = knee.locator(".mean")
+    assert lines.count() == 3  # one policy, and both legs of the other
+    drawn = [
+        line.evaluate("each => [getComputedStyle(each).stroke, each.getAttribute('stroke-opacity')]")
+        for line in lines.all()
+    ]
+    values = tab.locator("figure", has=knee).locator(".value .own")
+    told = [value.evaluate("each => getComputedStyle(each).borderLeftColor") for value in values.all()]
+    assert told == [
+        shade if opacity == "1" else shade.replace("rgb(", "rgba(").replace(")", f", {opacity})")
+        for shade, opacity in drawn
+    ]
+    assert len(set(told)) == 3
+    tab.close()
+
+
+def test_the_page_has_the_colours_that_its_browser_prefers_until_the_reader_turns_them(chromium, page):
+    tab, _, _ = opened(chromium, page, 1280, color_scheme="dark")
+    light, dark = "rgb(255, 255, 255)", "rgb(20, 24, 28)"
+    seen = [tab.evaluate("getComputedStyle(document.body).backgroundColor")]
+    tab.locator("#theme").click()
+    seen += [tab.evaluate("getComputedStyle(document.body).backgroundColor")]
+    assert seen == [dark, light]
     tab.close()
 
 
