@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
@@ -17,6 +18,8 @@ import ray  # pyright: ignore[reportMissingImports]
 
 MOST_RETRIES = 10
 """Nodes that may die under a command before it counts as failed; chosen."""
+NEWS = 2.0
+"""Time within which a cluster knows that a processor has become free [s]; chosen."""
 
 
 @contextmanager
@@ -42,6 +45,23 @@ def joined(processors: int | None = None) -> Iterator[None]:
         yield
     finally:
         ray.shutdown()
+
+
+def tell_of_wait(needed: int, purpose: str) -> None:
+    """Print a line if fewer processors of the cluster are free than are `needed` for the `purpose`; Ray waits for them
+    without a word."""
+    end = time.monotonic() + NEWS
+    while (free := int(ray.available_resources().get("CPU", 0))) < needed:
+        if time.monotonic() > end:
+            total = int(ray.cluster_resources().get("CPU", 0))
+            processors = f"{needed} processor{'s' * (needed > 1)}"
+            print(
+                f"waiting for {processors} of the Ray cluster, for {purpose}: {free} of its {total} are free",
+                file=sys.stderr,
+                flush=True,
+            )
+            return
+        time.sleep(0.1)
 
 
 @contextmanager
@@ -77,6 +97,7 @@ def run_on_ray(commands: Sequence[tuple[str, list[str]]]) -> None:
     Raises `KeyboardInterrupt` after a signal, with the commands ended.
     """
     with joined():
+        tell_of_wait(1, f"{commands[0][0]}, the first of {len(commands)}")
         task = ray.remote(num_cpus=1, max_retries=MOST_RETRIES)(_run)
         names = {task.remote(words, os.getcwd()): name for name, words in commands}
         waiting = list(names)

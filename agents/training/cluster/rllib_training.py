@@ -43,7 +43,7 @@ from ..progress import Progress
 from ..returns import evaluation_of
 from ..run_record import RLLIB, best_of, is_of_rllib, read_record, require_past, write_record
 from ..stopping import Stopping
-from .nodes import ending_waits, joined
+from .nodes import ending_waits, joined, tell_of_wait
 from .rllib_network import OBSERVATION_CLIP, ActorCritic, actor_layers
 
 PACKAGES = ("springfoot", "mujoco", "gymnasium", "numpy", "scipy", "torch", "ray")
@@ -175,6 +175,8 @@ class _Run:
         with ExitStack() as stack:
             self._connect(stack)
             with ending_waits():
+                assert self._runners is not None
+                tell_of_wait(self._runners, "RLlib's runners")
                 self._algorithm = self._build()
             stack.callback(shutil.rmtree, self._algorithm.logdir, ignore_errors=True)  # Ray's, empty
             stack.callback(self._algorithm.stop)

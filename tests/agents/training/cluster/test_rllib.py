@@ -164,20 +164,49 @@ def test_more_runners_than_the_cluster_has_processors_are_refused(cluster, tmp_p
     assert not list(tmp_path.iterdir())
 
 
-def test_sigterm_ends_the_wait_for_processors_that_others_use(cluster, tmp_path):
+@pytest.fixture
+def others(cluster):
+    """Programs that use both processors of the cluster."""
+
     class Other:
         def begin(self): ...
 
     others = [ray.remote(num_cpus=1)(Other).remote() for _ in range(2)]
     ray.get([other.begin.remote() for other in others])
+    return others
+
+
+def test_a_wait_for_processors_that_others_use_is_told_and_sigterm_ends_it(cluster, others, tmp_path):
     words = ["--engine", "rllib", "--num-env-runners", "1", "--out", str(tmp_path / "run")]
-    process = subprocess.Popen([*TRAIN, *words], env=os.environ | {"RAY_ADDRESS": cluster.address})
+    environment = os.environ | {"RAY_ADDRESS": cluster.address}
+    process = subprocess.Popen([*TRAIN, *words], env=environment, stderr=subprocess.PIPE, text=True)
     while not any(actor["State"] == "PENDING_CREATION" for actor in ray._private.state.actors().values()):
         assert process.poll() is None
         time.sleep(0.2)
     process.send_signal(signal.SIGTERM)
-    assert process.wait(120) == 143
+    _, told = process.communicate(timeout=120)
+    assert process.returncode == 143
+    assert told.count("waiting for 1 processor of the Ray cluster, for RLlib's runners: 0 of its 2 are free\n") == 1
     assert not list(tmp_path.iterdir())
+
+
+def test_commands_tell_of_a_wait_and_run_when_a_processor_is_free(cluster, others, capsys):
+    from springfoot.agents.training.cluster.nodes import run_on_ray
+
+    said = "waiting for 1 processor of the Ray cluster, for first, the first of 2: 0 of its 2 are free\n"
+    commands = [(name, ["sh", "-c", "echo done >&2"]) for name in ("first", "second")]
+    with ThreadPoolExecutor() as pool:
+        running = pool.submit(run_on_ray, commands)
+        told = ""
+        while said not in told:
+            assert not running.done()
+            time.sleep(0.1)
+            told += capsys.readouterr().err
+        ray.kill(others[0])
+        running.result()
+    assert sorted(capsys.readouterr().err.splitlines()) == ["first: done", "second: done"]
+    run_on_ray(commands[:1])
+    assert capsys.readouterr().err == "first: done\n"  # no word where a processor is free
 
 
 def test_trainings_of_a_study_run_on_the_nodes_and_again_where_one_dies(cluster, tmp_path, capsys):
