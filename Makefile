@@ -20,7 +20,7 @@ help:
 	@echo "make test-sdist  build the source distribution, and run its tests in an empty folder"
 	@echo "make test-lowest run the quick tests with the lowest versions that pyproject.toml allows"
 	@echo "make notebooks  run examples/notebooks in a Jupyter kernel, in an environment of its own"
-	@echo "make licences  licences and SBOM of what is installed: build/licences.md, build/sbom.json"
+	@echo "make licences  licences and SBOM of what users of the wheel get: build/licences.md, build/sbom.json"
 	@echo "make test-learners  train with every library of docs/how-to/learners.md, each outside $(VENV); goes on after a stop"
 	@echo "make test-rllib  train with RLlib on several Ray nodes of this machine, kill some, in an environment of its own"
 	@echo "make test-kills   end 20 trainings several times each, resume them, and compare them with uninterrupted ones"
@@ -130,13 +130,21 @@ build/notebooks/installed: pyproject.toml constraints.txt
 	  nbclient ipykernel
 	@touch $@
 
-licences: install build/licences/installed
-	build/licences/bin/pip-licenses --python $(BIN)/python --with-urls --format markdown --output-file build/licences.md
-	build/licences/bin/cyclonedx-py environment --pyproject pyproject.toml --output-file build/sbom.json $(BIN)/python
+# Of what a user of the wheel gets: all extras but rllib, which pins another Gymnasium, and those of developers. The
+# tools read the version from a copy of pyproject.toml, which has none itself.
+licences: build/licences/installed
+	build/licences/bin/pip-licenses --python build/licences/user/bin/python --with-urls --format markdown --output-file build/licences.md
+	sed "s/^dynamic = .*/version = \"$$(build/licences/user/bin/springfoot --version | cut -d' ' -f2)\"/" pyproject.toml \
+	  > build/licences/pyproject.toml
+	build/licences/bin/cyclonedx-py environment --pyproject build/licences/pyproject.toml --output-file build/sbom.json \
+	  build/licences/user/bin/python
 
-build/licences/installed: constraints.txt
+build/licences/installed: constraints.txt pyproject.toml
 	$(PYTHON) -m venv build/licences
 	build/licences/bin/pip install --disable-pip-version-check --constraint constraints.txt pip-licenses cyclonedx-bom
+	$(PYTHON) -m venv build/licences/user
+	build/licences/user/bin/pip install --disable-pip-version-check --constraint constraints.txt \
+	  --editable ".[train,onnx,live,minari,c3d,parquet,film]"
 	@touch $@
 
 test-learners: install build/learners/many/installed
