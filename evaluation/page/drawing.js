@@ -65,7 +65,7 @@ function frame(parent, title, xUnit, yUnit, xs, ys) {
 const PERCENT = Array.from({ length: 101 }, (_, k) => k);
 const followers = []; // each is told where in the stride and the step we are, and draws its cursor there
 // What is drawn of the policies in one panel: a line each, or where its feet differ one for the left leg and a finer, paler one for the right.
-const lines = which => which.flatMap((p, i) => (p.legs || [p]).map((own, leg) => ({ ...own, of: i, leg, name: [policies[i].name, ...(p.legs ? [["left", "right"][leg]] : [])].join(" "), shade: colour(i), dash: dash(i), width: leg ? 1.2 : 1.9, opacity: leg ? .6 : 1 })));
+const lines = which => which.flatMap((p, i) => (p.legs || [p]).map((own, leg) => ({ ...own, of: i, leg, side: p.legs ? ["left ", "right "][leg] : "", name: [policies[i].name, ...(p.legs ? [["left", "right"][leg]] : [])].join(" "), shade: colour(i), dash: dash(i), width: leg ? 1.2 : 1.9, opacity: leg ? .6 : 1 })));
 // Which policy alone is shown, by its number; null for all. Whatever belongs to one has data-of.
 let only = null;
 const isShown = p => only === null || p.of === only;
@@ -99,7 +99,7 @@ function panel(parent, which) {
   const tell = (begin, texts, end) => {
     note.replaceChildren();
     if (begin) make(note, "span", begin);
-    drawn.forEach((p, i) => { if (isShown(p)) make(note, "span", texts[i], { class: "own", style: `border-color:${p.shade}${Math.round(255 * p.opacity).toString(16)}` }); });
+    drawn.forEach((p, i) => { if (isShown(p)) make(note, "span", p.side + texts[i], { class: "own", style: `border-color:${p.shade}${Math.round(255 * p.opacity).toString(16)}` }); });
     if (end) make(note, "span", end);
   };
   let following = () => {};

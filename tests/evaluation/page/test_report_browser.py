@@ -219,6 +219,7 @@ def test_feet_are_drawn_by_what_they_are(chromium, page):
         for shade, opacity in drawn
     ]
     assert len(set(told)) == 3
+    assert [value.inner_text().rpartition(" ")[0] for value in values.all()] == ["", "left", "right"]
     tab.close()
 
 
