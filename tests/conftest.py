@@ -1,11 +1,13 @@
-"""Kernels compiled before the tests begin; and a real browser for tests of pages, or why they are skipped."""
+"""One thread for torch, kernels compiled before the tests begin; and a real browser for tests of pages, or why not."""
 
+import os
 import shutil
 import subprocess
 import sys
 
 import pytest
 
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # before torch is imported: two threads take ten times as long for SAC
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 COMPILE = """
 from springfoot.envs import SegmentedFootBipedVector

@@ -103,7 +103,8 @@ def test_ctrl_c_ends_all_in_good_order(tmp_path, number):
 @pytest.mark.slow
 def test_a_process_that_is_killed_is_told_and_the_others_go_on(tmp_path):
     folder = tmp_path / "several"
-    words = ["--out", str(folder), "--seeds", "2", "--timesteps", "8192", "--num-envs", "4", "--update-steps", "512"]
+    words = ["--out", str(folder), "--seeds", "2", "--timesteps", "4096", "--num-envs", "4", "--update-steps", "512"]
+    words += ["--eval-episodes", "2", "--episode-seconds", "1"]
     command, pipe = [sys.executable, str(SCRIPT), *words], subprocess.PIPE
     process = subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True)
     while not (folder / "seed-0" / RUN).exists():
