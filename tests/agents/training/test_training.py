@@ -233,6 +233,7 @@ def test_what_cannot_be_gone_on_with_is_refused(run, tmp_path):
         training.resume(tmp_path, 1000)
 
 
+@pytest.mark.slow
 def test_it_learns(tmp_path):
     """To walk better, by the default reward, than the untrained mean action does on the same fixed seeds."""
     config = TrainingConfig(

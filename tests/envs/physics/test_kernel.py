@@ -3,7 +3,9 @@
 import os
 import subprocess
 import sys
+from collections.abc import Sequence
 from importlib import import_module
+from itertools import product
 from pathlib import Path
 
 import pytest
@@ -88,26 +90,29 @@ print(sum(whole.stats.cache_hits.values()), len(said))
 """
 
 
-def alone(folder: Path, *words: str, **environment: str) -> subprocess.CompletedProcess[str]:
-    if not (folder / "alone.py").exists():  # old numba takes a file written anew for a changed one
-        (folder / "alone.py").write_text(ALONE, encoding="utf-8")
+def alone(
+    folder: Path, *words: str, modules: Sequence[str] = ("alone",), **environment: str
+) -> subprocess.CompletedProcess[str]:
+    for module in modules:
+        if not (folder / f"{module}.py").exists():  # old numba takes a file written anew for a changed one
+            (folder / f"{module}.py").write_text(ALONE, encoding="utf-8")
     variables = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"} | environment
-    command = [sys.executable, "-B", "-c", "import alone", *words]
+    command = [sys.executable, "-B", "-c", f"import {', '.join(modules)}", *words]
     return subprocess.run(command, cwd=folder, env=variables, check=True, capture_output=True, text=True)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("ending", ["nbi", "nbc"])
-@pytest.mark.parametrize("part", [0.0, 0.01, 0.5, 0.99])
-def test_a_cache_cut_short_is_made_anew(tmp_path, ending, part):
-    assert alone(tmp_path).stdout == "0 0\n"
-    files = list((tmp_path / "__pycache__").glob(f"alone.whole*.{ending}"))
-    assert files
-    for file in files:
-        content = file.read_bytes()
-        file.write_bytes(content[: int(part * len(content))])
-    assert alone(tmp_path).stdout == "0 0\n"
-    assert alone(tmp_path).stdout == "1 0\n"
+def test_a_cache_cut_short_is_made_anew(tmp_path):
+    cuts = {f"alone_{number}": cut for number, cut in enumerate(product(("nbi", "nbc"), (0.0, 0.01, 0.5, 0.99)))}
+    assert alone(tmp_path, modules=[*cuts]).stdout == "0 0\n" * len(cuts)
+    for name, (ending, part) in cuts.items():  # each in a module of its own, all modules in one process
+        files = list((tmp_path / "__pycache__").glob(f"{name}.whole*.{ending}"))
+        assert files
+        for file in files:
+            content = file.read_bytes()
+            file.write_bytes(content[: int(part * len(content))])
+    assert alone(tmp_path, modules=[*cuts]).stdout == "0 0\n" * len(cuts)
+    assert alone(tmp_path, modules=[*cuts]).stdout == "1 0\n" * len(cuts)
 
 
 def test_a_cache_with_a_flipped_bit_does_not_run(tmp_path):
