@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 from scipy.integrate import solve_bvp
-from scipy.interpolate import PPoly
+from scipy.interpolate import BPoly, PPoly
 
 from springfoot.gait import GRAVITY
-from springfoot.gait.plan.cart_table import Bob, closed_form, periodic_com, zmp
+from springfoot.gait.plan.cart_table import Bob, _quintics, closed_form, periodic_com, zmp
 
 TIMES, STEP = np.array([0.0, 0.066, 0.55]), 0.66
 POINTS = np.array([0.140 - STEP, -0.020, 0.140])
@@ -94,6 +94,13 @@ def test_over_straight_lines_the_closed_form_is_the_textbooks_cosh_and_sinh():
         first > GRID, a1 * np.cosh(u) + b1 * np.sinh(u), a2 * np.cosh(u) + b2 * np.sinh(u)
     )
     assert np.abs(motion_over(0.0, 0.0).path(GRID) - expected).max() < 1e-12
+
+
+def test_quintics_made_at_once_have_the_bits_of_scipys_made_one_by_one():
+    rng = np.random.default_rng(0)
+    t, (x, v, a) = np.sort(rng.uniform(0, 1, 240)), rng.normal(size=(3, 240))
+    one_by_one = PPoly.from_bernstein_basis(BPoly.from_derivatives(t, np.stack([x, v, a], -1)))
+    np.testing.assert_array_equal(_quintics(t, x, v, a).c, one_by_one.c)
 
 
 @pytest.mark.parametrize("pieces", [1, 2, 5])
