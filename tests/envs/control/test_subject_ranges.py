@@ -46,7 +46,8 @@ def test_a_height_and_a_mass_that_make_no_body_are_drawn_again():
 
 
 @pytest.mark.slow
-def test_whatever_range_its_slowest_and_fastest_body_may_walk_at_starts():
+@pytest.mark.parametrize("part", range(8))  # of the same 200 ranges, so that both workers plan
+def test_whatever_range_its_slowest_and_fastest_body_may_walk_at_starts(part):
     """A short body at a high speed walks as the settings' tall body would beyond the speeds that it may have."""
     random = np.random.default_rng(0)
     beyond = 0
@@ -60,7 +61,8 @@ def test_whatever_range_its_slowest_and_fastest_body_may_walk_at_starts():
         settings = BipedSettings(height=random.choice(heights), speed=random.choice(speeds), **ranges)
         grid = tabulated_speeds(settings)
         beyond += grid[0] < 0.4 or grid[-1] > 2.0
-        assert len(reference_walks(settings)) == len(grid)
+        if number // 2 % 8 == part:
+            assert len(reference_walks(settings)) == len(grid)
     assert beyond > 20
 
 
