@@ -108,7 +108,7 @@ def finely_used(biped: Biped, torque: NDArray, angle: NDArray, windows: int) -> 
     smooth = smooth.reshape(fibres.shape)
     half = -smooth * turn / 2
     strength = leg_strengths(biped.body, biped.settings.feet)
-    return muscle_use(smooth, np.stack([half, half], -1), PHYSICS_STEP, strength, biped.body.stiffness_scale)
+    return muscle_use(smooth, np.stack([half, half], -1), PHYSICS_STEP, strength, biped.body.strength_scale)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -58,7 +58,7 @@ def test_windows_price_a_walk_as_steps_of_2_ms_with_the_same_smooth_force_do(nam
     torque, angle, ticks, _ = replayed(biped, act, windows)
     fine = finely_used(biped, torque, angle, windows)
     kept = np.stack([tick.fibre_moment[0] for tick in ticks]), np.stack([tick.muscle_work[0] for tick in ticks])
-    own = muscle_use(*kept, TICK, leg_strengths(biped.body, settings.feet), biped.body.stiffness_scale)
+    own = muscle_use(*kept, TICK, leg_strengths(biped.body, settings.feet), biped.body.strength_scale)
     assert own.energy.sum() == pytest.approx(fine.energy.sum(), rel=0.025)
     assert own.activation.sum() == pytest.approx(fine.activation.sum(), rel=0.02)
 
@@ -88,7 +88,7 @@ def test_the_reward_pays_what_a_recording_measures():
             series["muscle_work"],
             TICK,
             leg_strengths(body, settings.feet),
-            body.stiffness_scale,
+            body.strength_scale,
         )
         terms = dict(zip(TERMS, series["reward"].T, strict=True))
         way = settings.speed * 2 * TICK
@@ -109,10 +109,10 @@ def test_parts_of_the_work_make_up_that_of_the_joint(name, given):
     moment = series["fibre_moment"][1:]
     pull = np.maximum(moment, 0.0)
     # What a tendon holds at the end and did not at the start, F^2 / 2 k, from the fibres' force between two windows.
-    stored = 0.5 * pull[:-1] * pull[1:] * np.array(TENDON_GIVE) / body.stiffness_scale
+    stored = 0.5 * pull[:-1] * pull[1:] * np.array(TENDON_GIVE) / body.strength_scale
     tendon = stored[0] - stored[-1]
     strength = leg_strengths(body, settings.feet)
-    fibres = muscle_use(moment, series["muscle_work"][1:], TICK, strength, body.stiffness_scale).work.sum(-1)
+    fibres = muscle_use(moment, series["muscle_work"][1:], TICK, strength, body.strength_scale).work.sum(-1)
     tissue = -(passive_moments(body, middle) * turn)[1:-1].sum(0)
     damping = -(passive_damping(body) * turn**2 / TICK)[1:-1].sum(0)
     orthosis = settings.right_foot.foot.ankle.orthosis
