@@ -11,6 +11,7 @@ from springfoot.envs.physics import foot as physics_foot
 from springfoot.envs.physics.foot import LOCK, SOUND
 from springfoot.envs.physics.model import ANKLE, JOINTS, RIGHT, TOE, passive_damping
 from springfoot.envs.physics.muscles import leg_strengths, muscles_of
+from springfoot.envs.physics.timing import PHYSICS_STEPS_PER_WINDOW
 from springfoot.envs.settings import feet as settings_feet
 from springfoot.envs.settings.feet import RIGID_TOE_STIFFNESS
 from springfoot.envs.settings.settings import body_of, settings_from
@@ -61,6 +62,15 @@ def test_windows_price_a_walk_as_steps_of_2_ms_with_the_same_smooth_force_do(nam
     own = muscle_use(*kept, TICK, leg_strengths(biped.body, settings.feet), biped.body.strength_scale)
     assert own.energy.sum() == pytest.approx(fine.energy.sum(), rel=0.025)
     assert own.activation.sum() == pytest.approx(fine.activation.sum(), rel=0.02)
+
+
+def test_a_walk_that_falls_is_replayed_to_its_fall():
+    act, settings = policy_and_settings("schedule", {"episode_seconds": 7.0, "right_foot": "rigid"})
+    biped = Biped(settings, 1)
+    biped.reset(np.array([0]), [0])
+    torque, angle, ticks, _ = replayed(biped, act, 600)
+    assert 0 < len(ticks) < 600
+    assert len(torque) == len(angle) - 1 == PHYSICS_STEPS_PER_WINDOW * len(ticks)
 
 
 def test_a_force_that_alternates_every_window_is_priced():
