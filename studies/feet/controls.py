@@ -80,9 +80,9 @@ TRIED_SPRINGS = (
         settings={k: both(braced(ankle_stiffness=k) | WITH_MASS) for k in BOTH_ANKLES},
     ),
     Springs(
-        name="both ankles, one-way",
-        against="slack, both ankles, one-way",
-        settings={k: both(braced(ankle_stiffness=k, ankle_deg=-5.73, engages="dorsiflexion")) for k in BOTH_ANKLES[:5]},
+        name=f"both ankles, one-way, {DEVICE_KG:g} kg each",  # from the neutral ankle on, as a clutch does
+        against=f"slack, both ankles, one-way, {DEVICE_KG:g} kg each",
+        settings={k: both(braced(ankle_stiffness=k, engages="dorsiflexion") | WITH_MASS) for k in BOTH_ANKLES},
     ),
 )
 """Springs whose best stiffness and saving are told."""
