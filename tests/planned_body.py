@@ -96,7 +96,7 @@ class Setup:
         task, controls, bodies = self.at(left_phase, measurement)
         controls["decision"]["action"], controls["decision"]["last_action"] = values["action"], values["last_action"]
         controls["springs"]["stiffness"] = values["stiffness"]
-        controls["springs"]["acts"] = 1.0
+        controls["springs"]["taut"] = 1.0
         for name, value in values["muscles"].items():
             bodies["muscles"][name] = value
         if values["last_force"] is not None:

@@ -385,7 +385,8 @@ class Biped(ExactState):
         watched = self.on_tick is not None
         if watched:
             step.window_start = {"phase": self._legs.phase.copy(), "active": step.running.copy()}
-            step.window_start |= stiffness_and_rest(self._control)
+            slack = self._simulation.arrays.bodies["muscles"]["slack"]
+            step.window_start |= stiffness_and_rest(self._control, slack)
         self._simulation.advance(self._control, step.ids, watched=watched)
 
     def _next_window(self, step: "_Step", window: int) -> None:

@@ -46,7 +46,7 @@ class Tables(NamedTuple):
     rest: NDArray
     """(R, SAMPLES, 2, 2 or 4) rest angles of ankle and toe [rad], and torques beside the springs [N m]."""
     schedule: NDArray
-    """(R, SAMPLES, 2, 2) fixed stiffness of ankle and toe [N m/rad]."""
+    """(R, SAMPLES, 2, 2) the schedule's stiffness of ankle and toe [N m/rad]."""
     legs: NDArray
     """(R, SAMPLES, 2, 7) of `leg_curves`."""
     incline: NDArray

@@ -69,7 +69,7 @@ FOOT = np.dtype(
 SPRING_STATE = np.dtype(
     [
         ("stiffness", float, FEET),  # K of the muscles [N m/rad]
-        ("acts", float, FEET),  # 1 while they act, 0 while they are slack
+        ("taut", float, FEET),  # 1 while they act, 0 while they are slack
         ("device", float, FEET),  # K of a device in their place [N m/rad]
         ("equilibrium", float, FEET),  # rest angle [rad]
         ("work_stiffness", float, FEET),  # done by the last change of stiffness [J]

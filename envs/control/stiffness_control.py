@@ -16,8 +16,8 @@ from springfoot.gait.body.body import Body
 from springfoot.gait.body.tissue import TENDON_SHARE
 
 from ..physics.kernel import kernel, part
-from ..physics.model import ANKLE, KNEE
-from ..physics.muscles import tissue_stiffness
+from ..physics.model import ANKLE, HIP, KNEE, TOE
+from ..physics.muscles import passive_moments, tissue_stiffness
 from ..physics.timing import CONTROL_WINDOW
 from ..settings.settings import BipedSettings
 from .foot_rows import device, foot_lines, foot_rows, has_lines_of
@@ -82,13 +82,13 @@ SPRING_OPTIONS = np.dtype(
 def stiffen(rows, bodies, schedule, options, factor, walking, fixed) -> None:
     """Request new stiffness of the muscles at ankles and toes, to act after the delay.
 
-    A body's first stiffness in an episode (`springs.fresh`) acts at once and does no work. Changing K to K' under a
-    deflection x puts 1/2 (K' - K) x^2 into the spring.
+    A body's first stiffness in an episode (`springs.fresh`) takes effect at once and does no work. Changing K to K'
+    under a deflection x puts 1/2 (K' - K) x^2 into the spring.
 
     Args:
         rows: (N,) of `CONTROL_ROW`; `springs` is changed.
         bodies: (N,) of `BODY_ROW`, as measured now.
-        schedule: (R, SAMPLES, 2, 2) fixed stiffness of ankle and toe [N m/rad], of a `PhaseTable`.
+        schedule: (R, SAMPLES, 2, 2) the schedule's stiffness of ankle and toe [N m/rad], of a `PhaseTable`.
         options: (N,) of `SPRING_OPTIONS`.
         factor: (N, 4) factors of the actions on the stiffness [-].
         walking: (N,) bool; the springs of other bodies do not change.
@@ -121,7 +121,7 @@ def stiffen(rows, bodies, schedule, options, factor, walking, fixed) -> None:
                 if springs.fresh or springs.delay == 0:
                     springs.stiffness[side, joint] = after
                 if not springs.fresh and springs.delay == 0:
-                    work = springs.acts[side, joint] * 0.5 * (after - before) * deflection**2
+                    work = springs.taut[side, joint] * 0.5 * (after - before) * deflection**2
                     springs.work_stiffness[side, joint] = work
 
 
@@ -137,15 +137,15 @@ def _act_on_request(springs, angle):
             after = springs.requests[springs.delay, side, joint]
             deflection = springs.equilibrium[side, joint] - angle[side, ANKLE + joint]
             springs.stiffness[side, joint] = after
-            springs.work_stiffness[side, joint] += springs.acts[side, joint] * 0.5 * (after - before) * deflection**2
+            springs.work_stiffness[side, joint] += springs.taut[side, joint] * 0.5 * (after - before) * deflection**2
             for past in range(len(springs.requests) - 1, 0, -1):
                 springs.requests[past, side, joint] = springs.requests[past - 1, side, joint]
 
 
 @part
 def _bound_by_tendon(row, option, angle):
-    """Lower the K of ankles to that of tendon and tissue at the joint angles `angle` (side, joint) [rad], and count the
-    work of the change.
+    """Lower the K of calves to that of tendon and tissue at the joint angles `angle` (side, joint) [rad], and count the
+    work of the change; an adaptive prosthesis has no tendon.
 
     `row` is of `CONTROL_ROW`, `option` of `SPRING_OPTIONS`. Index 0 of the springs' arrays is the ankle.
     """
@@ -153,12 +153,12 @@ def _bound_by_tendon(row, option, angle):
     for side in range(2):
         tissue = option.tissue * tissue_stiffness(angle[side, KNEE], angle[side, ANKLE])
         most = row.subject.scale.torque * (option.tendon + tissue)
-        if springs.stiffness[side, 0] > most:
+        if springs.stiffness[side, 0] > most and not row.feet.rests[side, 0]:
             deflection = springs.equilibrium[side, 0] - angle[side, ANKLE]
             change = most - springs.stiffness[side, 0]
             springs.stiffness[side, 0] = most
             if not springs.fresh:
-                springs.work_stiffness[side, 0] += springs.acts[side, 0] * 0.5 * change * deflection**2
+                springs.work_stiffness[side, 0] += springs.taut[side, 0] * 0.5 * change * deflection**2
 
 
 @part
@@ -178,7 +178,7 @@ def muscle_stiffness(springs, side, joint) -> float:
     `springs` is of `SPRING_STATE`. The reward charges this K alone; the control and `info` hold the muscles' and the
     device's together.
     """
-    return springs.acts[side, joint] * springs.stiffness[side, joint]
+    return springs.taut[side, joint] * springs.stiffness[side, joint]
 
 
 @part
@@ -198,17 +198,29 @@ def _put_into_control(row, control, feet, theta, side, joint):
 
 
 @part
+def _leave_tissue(control, angle, scale):
+    """Put the passive tissue of an ankle with slack muscles into `control` (joint, 2) of its leg: the tangent of its
+    moment at the angles `angle` (joint,) [rad], for a body of that `Body.strength_scale`.
+
+    Where muscles act, the moment of the tissue is a part of theirs.
+    """
+    moment = passive_moments(angle[HIP], angle[KNEE], angle[ANKLE], angle[TOE])[ANKLE]  # plantarflexion positive
+    control[ANKLE, 0] = scale * tissue_stiffness(angle[KNEE], angle[ANKLE])
+    control[ANKLE, 1] = control[ANKLE, 0] * angle[ANKLE] - scale * moment
+
+
+@part
 def move(rows, bodies, control, rest, incline, feet, options, walking) -> None:
     """Begin a control window: put K and K theta_eq of ankles and toes into the control.
 
     K is the requested stiffness of `delay` windows ago, bounded by an ankle's tendon at the present angles if the
     setting asks for it; theta_eq is the rest angle at the legs' phases, or that of the foot's setting. Moving the rest
     angle, so that the deflection goes from x to x', puts 1/2 K (x'^2 - x^2) into the spring. Muscles that go slack as
-    the leg begins to swing lose their stored energy. A device has K and theta_eq of its setting.
+    the leg begins to swing lose their stored energy; passive tissue remains. A device has K and theta_eq of its own.
 
     Args:
         rows: (N,) of `CONTROL_ROW`; `springs` is changed.
-        bodies: (N,) of `BODY_ROW`, as measured now.
+        bodies: (N,) of `BODY_ROW`, as measured now; `muscles.slack` is set.
         control: (N, side, joint, 2) for `envs.physics.simulation.Simulation.advance`, filled.
         rest: (R, SAMPLES, 2, 2 or 4) rest angles of ankle and toe [rad], of a `PhaseTable`; with 4, the last two are
             torques [N m] that act beside the springs: each shifts the rest angle by torque / K.
@@ -242,10 +254,10 @@ def move(rows, bodies, control, rest, incline, feet, options, walking) -> None:
                 k = springs.stiffness[side, joint]
                 theta = angle[side, ANKLE + joint]
                 if walking[i]:
-                    acted = acts = springs.acts[side, joint]  # 1 where muscles act, 0 where they are slack: before, now
+                    taut_before = taut = springs.taut[side, joint]
                     if not foot.in_swing[side, joint]:
-                        acts = 0.0 if _swings(rows[i], bodies[i].measured.force, side) else 1.0
-                        springs.acts[side, joint] = acts
+                        taut = 0.0 if _swings(rows[i], bodies[i].measured.force, side) else 1.0
+                        springs.taut[side, joint] = taut
                     new_rest = foot.rest[side, joint] if foot.rests[side, joint] else planned[joint]
                     if joint == 0 and not foot.rests[side, joint]:
                         new_rest += rows[i].person.offset[side, ANKLE]  # which lies there as among the joints
@@ -256,9 +268,13 @@ def move(rows, bodies, control, rest, incline, feet, options, walking) -> None:
                     after = new_rest - theta
                     springs.equilibrium[side, joint] = new_rest
                     if not springs.fresh:
-                        springs.work_stiffness[side, joint] += 0.5 * (acts - acted) * k * before * before
-                        springs.work_equilibrium[side, joint] += acts * 0.5 * k * (after * after - before * before)
+                        springs.work_stiffness[side, joint] += 0.5 * (taut - taut_before) * k * before * before
+                        springs.work_equilibrium[side, joint] += taut * 0.5 * k * (after * after - before * before)
                 _put_into_control(rows[i], control[i], feet, theta, side, joint)
+            slack = springs.taut[side, 0] == 0.0
+            bodies[i].muscles.slack[side] = 1 if slack else 0
+            if slack:
+                _leave_tissue(control[i, side], angle[side], bodies[i].muscles.muscles.tissue)
         if walking[i]:
             springs.fresh = 0
 
@@ -290,17 +306,18 @@ def _hold(rows, bodies, control, feet, standing):
                 rest = foot.rest[side, joint] if foot.rests[side, joint] else drive / k
                 k = k if foot.muscles[side, joint] else 0.0
                 theta = angle[side, ANKLE + joint]
-                k_before = springs.acts[side, joint] * springs.stiffness[side, joint]
+                k_before = springs.taut[side, joint] * springs.stiffness[side, joint]
                 before = springs.equilibrium[side, joint] - theta
                 after = rest - theta
                 springs.stiffness[side, joint] = k
                 springs.equilibrium[side, joint] = rest
-                springs.acts[side, joint] = 1.0
+                springs.taut[side, joint] = 1.0
                 springs.requests[:, side, joint] = k
                 if not springs.fresh:
                     springs.work_stiffness[side, joint] += 0.5 * (k - k_before) * before * before
                     springs.work_equilibrium[side, joint] += 0.5 * k * (after * after - before * before)
                 _put_into_control(rows[i], control[i], feet, theta, side, joint)
+            bodies[i].muscles.slack[side] = 0
         springs.fresh = 0
 
 
@@ -311,7 +328,7 @@ class FootSprings:
         settings: ranges of stiffness, action mode, equilibrium.
         equilibrium: (R, SAMPLES, 2) rest angles over the stride [rad], one for each row of the tables; or (R, SAMPLES,
             4), torques beside the springs [N m] behind them.
-        schedule: (R, SAMPLES, 2) fixed stiffness [N m/rad], which a residual action multiplies.
+        schedule: (R, SAMPLES, 2) the schedule's stiffness [N m/rad], which a residual action multiplies.
         subjects: bodies and commanded speeds.
         worn: the feet; the settings' if None.
     """
@@ -346,7 +363,7 @@ class FootSprings:
         self.schedule = PhaseTable(schedule)
         self._springs = subjects.rows["springs"]
         self._springs["fresh"] = 1
-        self._springs["acts"] = 1.0
+        self._springs["taut"] = 1.0
 
     def fit(self, ids: Sequence[int]) -> bool:
         """Take over the present feet and proportions of environments `ids` (K,); return True if `feet` is another
@@ -368,17 +385,17 @@ class FootSprings:
         return new_lines
 
     def reset(self, ids: NDArray, delay: ArrayLike = 0) -> None:
-        """Begin an episode of springs `ids` (K,).
+        """Begin an episode of springs `ids` (K,), whose muscles are taut.
 
-        Their next change does no work and acts at once, as if it had been requested long before. Later changes act
-        `delay` (K,) control windows after their request.
+        Their next stiffness does no work and has no delay, as if it had been requested long before. Later ones take
+        effect `delay` (K,) control windows after their request.
         """
         self._springs["fresh"][ids] = 1
         self._springs["delay"][ids] = delay
-        self._springs["acts"][ids] = 1.0
+        self._springs["taut"][ids] = 1.0
 
     def scheduled(self, leg_phase: NDArray) -> NDArray:
-        """Return the fixed stiffness of ankle and toe (N, side, 2) [N m/rad] at the phases `leg_phase` (N, side)."""
+        """Return the schedule's K of ankle and toe (N, side, 2) [N m/rad] at the phases `leg_phase` (N, side)."""
         curves = self.schedule.at(leg_phase, self._subjects.place)
         return curves * self._subjects.scale["torque"][:, None, None]
 

@@ -74,7 +74,7 @@ class FootJoint:
     strength: float = 1.0
     """Largest torque of the muscles downwards (plantarflexion) over that of the sound joint [-]."""
     acts_in_swing: bool = True
-    """False for muscles that are slack while the leg swings."""
+    """False for an ankle whose muscles are slack while the leg swings; its passive tissue stays."""
     orthosis: Spring | None = None
     """Spring beside the joint, which always acts."""
 

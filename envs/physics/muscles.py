@@ -15,7 +15,7 @@ from springfoot.gait.plan.effort import TENDON_GIVE, interval_work, metabolic_en
 
 from .foot import Feet
 from .kernel import part
-from .model import JOINTS, SIDES, joints_of
+from .model import ANKLE, JOINTS, SIDES, joints_of
 from .timing import CONTROL_WINDOW
 
 _LEGS = (len(SIDES), len(JOINTS))
@@ -33,6 +33,7 @@ MUSCLE_ROW = np.dtype(
         ("muscles", MUSCLES),
         ("time", float),  # at the end of the last window [s]
         ("windows", np.int64),  # since the episode began
+        ("slack", np.int64, len(SIDES)),  # 1 while an ankle's muscles are slack: its torque is then that of the tissue
         ("judged", np.int64),  # 1 once a step has used the sums below, which then begin anew
         ("angle", float, _LEGS),  # at the end of the last window [rad]
         ("velocity", float, _LEGS),  # likewise [rad/s]
@@ -45,7 +46,8 @@ MUSCLE_ROW = np.dtype(
 )
 """Recent work of the muscles of one body."""
 
-_tissue_moments = part(tissue_moments)
+passive_moments = part(tissue_moments)
+"""`tissue_moments`, compiled."""
 _interval_work = part(interval_work)
 _metabolic_energy = part(metabolic_energy)
 tissue_stiffness = part(ankle_tissue_stiffness)
@@ -109,7 +111,7 @@ def work_muscles(row, m, segments, velocity, control) -> None:
         segments: of `SEGMENTS`.
         velocity: (S, D) velocities after the window's physics steps [m/s, rad/s]. MuJoCo moves a joint by the velocity
             after a step, so they give the angles, and these the torques: recording torques too would cost more.
-        control: (side, joint, 2) K [N m/rad] and K theta_eq [N m] of the window; muscles without K are slack.
+        control: (side, joint, 2) K [N m/rad] and K theta_eq [N m] of the window; muscles without K do nothing.
     """
     if m.time <= row.time:
         return
@@ -125,7 +127,7 @@ def work_muscles(row, m, segments, velocity, control) -> None:
     for side in range(2):
         for joint in range(4):
             middle[joint] = 0.5 * (row.angle[side, joint] + m.angle[side, joint])
-        tissue = _tissue_moments(middle[0], middle[1], middle[2], middle[3])
+        tissue = passive_moments(middle[0], middle[1], middle[2], middle[3])
         for joint in range(4):
             dof = 3 + 4 * side + joint  # behind the trunk's x, z and pitch
             mean_torque = first = second = 0.0
@@ -141,7 +143,9 @@ def work_muscles(row, m, segments, velocity, control) -> None:
                 first += early * work
                 second += (1.0 - early) * work
                 before = after
-            row.positive_work += max(first + second, 0.0)
+            slack = joint == ANKLE and row.slack[side] == 1
+            if not slack:
+                row.positive_work += max(first + second, 0.0)
             turn = m.angle[side, joint] - row.angle[side, joint]
             row.angle[side, joint] = m.angle[side, joint]
             row.velocity[side, joint] = before
@@ -150,7 +154,7 @@ def work_muscles(row, m, segments, velocity, control) -> None:
             row.delivered[1, side, joint] = row.delivered[0, side, joint]
             row.moment[0, side, joint] = 0.0
             row.delivered[0, side, joint] = 0.0
-            if muscles.present[side, joint] and control[side, joint, 0] > 0.0:
+            if muscles.present[side, joint] and control[side, joint, 0] > 0.0 and not slack:
                 of_tissue = muscles.tissue * tissue[joint]
                 row.moment[0, side, joint] = -mean_torque - of_tissue
                 row.delivered[0, side, joint, 0] = first + 0.5 * of_tissue * turn

@@ -87,7 +87,8 @@ KINDS: dict[str, dict[str, Number]] = {
 which touches the ground with heel and tip alone. `passive`: a spring of fixed stiffness and rest angle at ankle and
 toe, or a torque-angle line (`ankle_table`, `toe_table`). `adaptive`: the policy sets their stiffness, the rest angle is
 fixed; or both are as a `schedule` says, a `StiffnessSchedule` in JSON form. `weak`: the plantarflexor moment is limited
-to a share of `envs.physics.model.TORQUE_LIMIT`. `drop`: the ankle's muscles are slack while the leg swings.
+to a share of `envs.physics.model.TORQUE_LIMIT`. `drop`: the ankle's muscles are slack while the leg swings, and its
+passive tissue alone holds it (`springfoot.gait.body.tissue`).
 """
 PLACES = {
     "orthosis": '; an orthosis is a key of a foot: {"kind": "intact", "orthosis": {"ankle_stiffness": 200}}',

@@ -180,8 +180,8 @@ class BipedSettings:
     """Toe stiffness at action -1 and +1 [N m/rad] for 1.70 m and 63 kg; scales with mass x height."""
     ankle_tendon: float | None = field(default=None, metadata=_SPRINGS)
     """Stiffness of the Achilles tendon about the ankle, for 1.70 m and 63 kg, [100..2000 N m/rad], such as 400. In
-    walking K then stays below that of tendon and passive tissue, and the term `stiffness` charges the calf's own K
-    beyond what its torque brings. By default there is no bound."""
+    walking a calf's K then is at most that of tendon and passive tissue as each 10 ms begin, and the term `stiffness`
+    charges the calf's own K beyond what its torque brings. By default there is no bound."""
     schedule: StiffnessSchedule | None = field(default=None, metadata=_SPRINGS)
     """Stiffness over the stride, JSON form of `springfoot.gait.springs.stiffness.StiffnessSchedule`; needed by
     equilibrium `phase`; action mode `residual` without one takes the fixed schedule of the leg tuning."""

@@ -178,12 +178,12 @@ _charged_calf_stiffness = part(charged_calf_stiffness)
 
 @part
 def _charged_stiffness(scale, controls, body, tendon, side, joint):
-    """Return the K of the muscles at one joint that the term `stiffness` charges [N m/rad].
+    """Return the K at one joint that the term `stiffness` charges [N m/rad].
 
-    All of it; of an ankle with a `tendon` [N m/rad], 0 for none, `charged_calf_stiffness`.
+    All of what the action sets; of a calf with a `tendon` [N m/rad], 0 for none, `charged_calf_stiffness`.
     """
     stiffness = muscle_stiffness(controls.springs, side, joint)
-    if joint > 0 or tendon == 0.0 or stiffness == 0.0:
+    if joint > 0 or tendon == 0.0 or stiffness == 0.0 or controls.feet.rests[side, joint]:
         return stiffness
     angle = body.measured.angle[side]
     unit = scale.strength_scale
@@ -202,9 +202,9 @@ def judge(rows, controls, bodies, table, options, forces, terms) -> None:
     `grf`, exp(-D/0.4) with D the body weights by which the feet's forces leave the target's range: vertical beyond 1.2
     (fourfold), both components beyond mean +- 0.5 SD at the leg's phase.
     Costs >= 0: `stiffness_rate`, squared change of the action in 20 ms; `stiffness`, mean over legs of
-    [(K_ankle/300)^2 + (K_toe/60)^2/4]/1.25, K of the muscles that act (a slack joint and a device in their place cost
-    nothing; with a tendon see `charged_calf_stiffness`), scaled to 1.70 m and 63 kg; `effort`, positive work of hips,
-    knees, ankles and toes in the step over body weight times commanded way: the cost of transport of that step. The
+    [(K_ankle/300)^2 + (K_toe/60)^2/4]/1.25, K of muscles and of an adaptive device (other devices and slack
+    muscles cost nothing; with a tendon see `charged_calf_stiffness`), scaled to 1.70 m and 63 kg; `effort`, positive
+    work of hips, knees, ankles and toes in the step over body weight times commanded way: its cost of transport. The
     price of the muscles (`springfoot.gait.plan.effort`), one control window late: `fibre_work`, metabolic energy of
     their fibres over body weight times commanded way; `activation`, mean over the step of the squared activation by
     volume, all joints together. `impact`, sum over feet and directions of the squared change of the force since the

@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from springfoot.envs import Biped
+from springfoot.envs.batch.step_result import INFO
 from springfoot.envs.control.equilibrium import foot_tables
 from springfoot.envs.control.phase_table import GRID
 from springfoot.envs.control.reference_walk import reference_walks, rows
+from springfoot.envs.control.stiffness_control import stiffness_ranges
 from springfoot.envs.physics.model import ANKLE, KNEE, SIDES
 from springfoot.envs.settings.settings import settings_from
 from springfoot.evaluation.recording.policies import policy_and_settings
@@ -104,3 +106,15 @@ def test_the_reward_charges_the_calfs_own_k_beyond_what_its_torque_brings():
             toe = info[f"stiffness/toe_{name}"]
             charged += 0.5 * ((max(own, 0.0) / 300.0) ** 2 + 0.25 * (toe / 60.0) ** 2) / 1.25
         assert info["reward/stiffness"] == pytest.approx(charged, rel=1e-12)
+
+
+def test_a_tendon_neither_bounds_nor_prices_an_adaptive_prosthesis():
+    charged = []
+    for tendon in (None, 150.0):
+        biped = Biped(settings_from(ankle_tendon=tendon, right_foot="adaptive", left_foot="adaptive"), 1)
+        biped.reset(np.array([0]), [0])
+        result = biped.step(np.ones((1, 4)))
+        named = dict(zip(INFO, result.values[0], strict=True))
+        assert named["stiffness/ankle_right"] == pytest.approx(stiffness_ranges(biped.settings, biped.body)[1][0])
+        charged.append(named["reward/stiffness"])
+    assert charged[0] == charged[1] > 1.0

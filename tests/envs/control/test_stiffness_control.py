@@ -139,9 +139,9 @@ def test_a_delayed_change_of_stiffness_does_work_on_its_own_spring_when_it_arriv
     assert not feet.work_stiffness.any()
     feet.move_equilibrium(phase)
     feet.move_equilibrium(phase)
-    acts = feet.rows["springs"]["acts"]
-    np.testing.assert_allclose(feet.work_stiffness, acts * 0.5 * (feet.stiffness - before) * deflection**2, atol=1e-12)
-    assert np.abs(feet.work_stiffness[acts > 0]).min() > 1e-6
+    taut = feet.rows["springs"]["taut"]
+    np.testing.assert_allclose(feet.work_stiffness, taut * 0.5 * (feet.stiffness - before) * deflection**2, atol=1e-12)
+    assert np.abs(feet.work_stiffness[taut > 0]).min() > 1e-6
 
 
 def test_phase_tables_are_linear_between_rows_and_each_environment_reads_its_own():
