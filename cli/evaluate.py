@@ -173,7 +173,7 @@ def _bar(words: str, total: float, delay: float = 0.0) -> tqdm:
 
 
 def _watch_of(bar: tqdm) -> Callable[[float], Callable[[float], object]]:
-    """Return the `watch` of `open_loop_copy` that advances `bar` as a policy walks to be copied."""
+    """Return the `Watch` of `open_loop` that shows on `bar` the walk from which a copy `frozen:POLICY` is measured."""
 
     def watch(seconds: float) -> Callable[[float], object]:
         """Set the length of the walk [s]; return the function to call with the seconds of each step."""

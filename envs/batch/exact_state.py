@@ -93,7 +93,7 @@ class ExactState(ABC):
             self._random[index] = _generator(self._random[index], generator_state)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _made_anew, (type(self), self._arguments, self.state())
+        return _unpickled, (type(self), self._arguments, self.state())
 
     def _numbers(self) -> Iterator[tuple[str, NDArray]]:
         """Yield name and view (N, ...) of every array of numbers that changes."""
@@ -125,7 +125,7 @@ def _generator(present: np.random.Generator | None, state: Mapping[str, Any] | N
     return present
 
 
-def _made_anew(kind: type[ExactState], arguments: dict[str, Any], state: dict[str, Any]) -> ExactState:
+def _unpickled(kind: type[ExactState], arguments: dict[str, Any], state: dict[str, Any]) -> ExactState:
     """Return a new batch of the class `kind` with these arguments, in this state."""
     batch = kind(**arguments)
     batch.restore(state)

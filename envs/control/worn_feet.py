@@ -36,7 +36,7 @@ class WornFeet:
     def check(self, given: Mapping[str, Any] | None) -> None:
         """Raise `SpringfootError` for feet `given`, as for `draw`, that this batch cannot wear."""
         for name in FOOT_SETTINGS:
-            self.chosen(name, (given or {}).get(name, []))
+            self.checked(name, (given or {}).get(name, []))
 
     def draw(
         self, randoms: Sequence[np.random.Generator], given: Mapping[str, Sequence[Any]] | None = None
@@ -46,15 +46,15 @@ class WornFeet:
         `given` has K feet in place of drawn ones, by the names of `FOOT_SETTINGS`, checked or in plain JSON.
         Feet are drawn there too, so that later draws do not depend on `given`.
         """
-        chosen = [self.chosen(name, (given or {}).get(name, [None] * len(randoms))) for name in FOOT_SETTINGS]
+        chosen = [self.checked(name, (given or {}).get(name, [None] * len(randoms))) for name in FOOT_SETTINGS]
         replaced = []
         for random, left, right in zip(randoms, *chosen, strict=True):
             drawn_left, drawn_right = draw_feet(self._drawn, random) if self._drawn else OWN_FEET
             replaced.append((left or drawn_left, right or drawn_right))
         return replaced
 
-    def chosen(self, name: str, feet: Sequence[Any]) -> list[Any]:
-        """Return feet that replace drawn ones, `name` being one of `FOOT_SETTINGS`; None stays None.
+    def checked(self, name: str, feet: Sequence[Any]) -> list[Any]:
+        """Return the feet that a reset or a saved state gives for `name`, one of `FOOT_SETTINGS`, checked; None stays.
 
         Raises `SpringfootError` for feet that this batch cannot wear.
         """
@@ -90,5 +90,5 @@ class WornFeet:
         listed = isinstance(pairs, (list, tuple)) and len(pairs) == count
         if not listed or any(not isinstance(pair, (list, tuple)) or len(pair) != 2 for pair in pairs):
             raise SpringfootError(f"the state does not fit: 'feet' must be {count} pairs of feet, got {quoted(pairs)}")
-        sides = [self.chosen(name, [pair[side] for pair in pairs]) for side, name in enumerate(FOOT_SETTINGS)]
+        sides = [self.checked(name, [pair[side] for pair in pairs]) for side, name in enumerate(FOOT_SETTINGS)]
         return list(zip(*sides, strict=True))

@@ -156,7 +156,7 @@ def open_loop_copy(
     *,
     name: str,
     threads: int = 2,
-    watch: Watch = lambda seconds: lambda decisions: None,
+    watch: Watch = lambda seconds: lambda walked: None,
 ) -> tuple[PolicyFunction, BipedSettings]:
     """Return a policy's mean K over the stride as a policy, and settings for it: `settings` with absolute actions.
 

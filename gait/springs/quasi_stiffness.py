@@ -1,10 +1,8 @@
 """Compute quasi-stiffness, the slope of a joint's moment over its angle, by phase of stance.
 
-That of strides is the slope of their mean curves, with an interval over strides. People's mean curves stand beside
-published trials.
+That of strides is the slope of their mean curves, with an interval over strides.
 """
 
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -12,8 +10,6 @@ import numpy as np
 
 from springfoot.arrays import NDArray
 
-from ..people.human import human_gait
-from .identification import PhaseSpring, identify
 from .jackknife import jackknife_interval
 from .spring_fit import Estimate
 from .stiffness import ankle_events, toe_events
@@ -22,6 +18,15 @@ SMALLEST_TURN = np.radians(2.0)
 """Least excursion of the angle in a phase for a slope over it to mean something [rad]; chosen."""
 SLOPE_STEP = 0.0005
 """Time between the samples of a slope [strides]; chosen: with 0.005 the ends of a phase weigh too much, up to 5 %."""
+FUKUCHI_OVERGROUND = (
+    ("controlled plantarflexion", 0.0, 0.058, 1.20, 0.52),
+    ("early rising", 0.058, 0.282, 2.14, 0.82),
+    ("late rising", 0.282, 0.460, 8.33, 2.87),
+    ("descending (push-off)", 0.460, 0.649, 3.48, 0.69),
+)
+"""Phase, its start and end, median and SD of the ankle's quasi-stiffness [N m/(rad kg)] in 25 overground trials of 25
+adults at 1.1 to 1.3 m/s (Fukuchi et al., PeerJ 6:e4640, 2018, CC BY 4.0; per-trial slopes computed in
+github.com/nikorose87/DJS-GA)."""
 
 
 class StancePhase(NamedTuple):
@@ -76,66 +81,3 @@ def phase_slope(angle: NDArray, moment: NDArray, phase: StancePhase) -> Estimate
     if len(strides) < 2:
         return Estimate(value, -np.inf, np.inf)
     return jackknife_interval(value, np.array([slope(strides[strides != stride]) for stride in strides]))
-
-
-@dataclass(frozen=True, kw_only=True)
-class QuasiStiffness:
-    """One phase of the ankle's angle-moment curve: people's mean curves beside published single trials."""
-
-    phase: str
-    """Name of the phase, as published."""
-    start: float
-    """Stride phase at its beginning."""
-    end: float
-    """Stride phase at its end."""
-    slope: float
-    """Slope of people's mean curve, moment over angle by least squares [N m/(rad kg)]."""
-    identified: PhaseSpring
-    """Spring and damper of the phase, if theta_eq stood still in it (`identification`); K [N m/(rad kg)]."""
-    published: float
-    """Median of the published slopes [N m/(rad kg)]."""
-    published_sd: float
-    """Standard deviation of the published slopes over trials [N m/(rad kg)]."""
-
-
-FUKUCHI_SPEED = 1.2
-"""Middle [m/s] of the speed class of `FUKUCHI_OVERGROUND`, 1.1 to 1.3 m/s."""
-FUKUCHI_OVERGROUND = (
-    ("controlled plantarflexion", 0.0, 0.058, 1.20, 0.52),
-    ("early rising", 0.058, 0.282, 2.14, 0.82),
-    ("late rising", 0.282, 0.460, 8.33, 2.87),
-    ("descending (push-off)", 0.460, 0.649, 3.48, 0.69),
-)
-"""Phase, its start and end, median and SD of the ankle's quasi-stiffness [N m/(rad kg)] in 25 overground trials of 25
-adults (Fukuchi et al., PeerJ 6:e4640, 2018, CC BY 4.0; per-trial slopes computed in github.com/nikorose87/DJS-GA)."""
-
-
-def ankle_quasi_stiffness() -> tuple[QuasiStiffness, ...]:
-    """Return the ankle's quasi-stiffness in four phases at 1.2 m/s: people's (`human_gait`) beside another
-    laboratory's.
-
-    Quasi-stiffness is the slope of the angle-moment curve, not the K of a spring.
-    """
-    human = human_gait(FUKUCHI_SPEED)
-    phase = np.arange(100) / 100
-    angle = human.mean("ankle", phase)
-    moment = human.mean("ankle_moment", phase)
-    velocity = human.rate("ankle", phase) / human.stride_time
-    # `identify` takes torques positive as the angle, opposite to people's moments. Phases end where the next begin.
-    bounds = (0.0, *(end for _, _, end, _, _ in FUKUCHI_OVERGROUND))
-    rows = []
-    for row, spring in zip(FUKUCHI_OVERGROUND, identify(-moment, angle, velocity, phase, bounds), strict=True):
-        name, start, end, median, sd = row
-        inside = (phase >= start) & (phase < end)
-        rows.append(
-            QuasiStiffness(
-                phase=name,
-                start=start,
-                end=end,
-                slope=float(np.polyfit(angle[inside], moment[inside], 1)[0]),
-                identified=spring,
-                published=median,
-                published_sd=sd,
-            )
-        )
-    return tuple(rows)

@@ -141,7 +141,7 @@ def price_table(prices: Sequence[Row], charges: Sequence[Row]) -> str:
 
 
 def _shown(row: Row) -> str:
-    """Return both prices of a walk, and the parts of ankle and toe where they are known."""
+    """Return the cell of a walk: fibre work / effort, and in brackets the fibre work of ankle and toe, if known."""
     prices = " / ".join(text_of(row[price], ".2f") for price in TWO_PRICES)
     return prices if row["toe"] is None else f"{prices} ({row['ankle']:.2f}, {row['toe']:.2f})"
 

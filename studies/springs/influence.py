@@ -244,7 +244,12 @@ def _speed_table(responses: Mapping[str, Response]) -> str:
         for cell in range(len(CELLS))
     ]
     rows.append(["unchanged m/s", *(f"{response.speed:.3f}" for response in responses.values())])
-    rows.append(["falls of all changed walks", *(str(response.falls.sum()) for response in responses.values())])
+    rows.append(
+        [
+            "changed walks that fell or were too slow",
+            *(str(response.unfinished.sum()) for response in responses.values()),
+        ]
+    )
     return table(["Δspeed of many strides, mm/s", *responses], rows)
 
 

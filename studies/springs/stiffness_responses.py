@@ -47,8 +47,8 @@ class Response:
     links: Mapping[str, tuple[float, float, float, float]]
     """Link -> Pearson's r over the cells, its 95 % interval (bootstrap over seeds), and the fraction of scrambled
     orders of the cells with an r as far from 0; NaN where nothing changes."""
-    falls: NDArray
-    """(C, len(DURATIONS)) number of changed walks that fell."""
+    unfinished: NDArray
+    """(C, len(DURATIONS)) number of changed walks that fell or were too slow for all strides."""
     cut: NDArray
     """(C,) fraction of the changes that the range of the actions cuts short."""
     speed: float
@@ -88,7 +88,7 @@ def summarise(walks: PairedWalks, change: float) -> Response:
         mean=mean,
         interval=interval,
         links={name: _link(values[x], values[y]) for name, (x, y) in LINKS.items()},
-        falls=walks.falls,
+        unfinished=walks.unfinished,
         cut=walks.cut,
         speed=float(np.nanmean(walks.unchanged[..., MOVEMENT.index("speed_m_s")])),
     )
@@ -137,7 +137,7 @@ def _link(x: NDArray, y: NDArray) -> tuple[float, float, float, float]:
 
 CSV_HEAD = (
     *("condition", "change", "joint", "phase", "begin", "end", "changed", "quantity", "when"),
-    *("mean", "low", "high", "falls", "cut_short"),
+    *("mean", "low", "high", "unfinished", "cut_short"),
 )
 LINKS_HEAD = ("condition", "link", "r", "low", "high", "scrambled_p")
 
@@ -147,9 +147,9 @@ def csv_rows(responses: Mapping[str, Response]) -> Iterator[tuple[Any, ...]]:
     for condition, response in responses.items():
         for cell, (joint, phase) in enumerate(CELLS):
             for key, mean in response.mean.items():
-                fell = int(response.falls[cell, DURATIONS.index(key[0])]) if key[0] in DURATIONS else 0
+                unfinished = int(response.unfinished[cell, DURATIONS.index(key[0])]) if key[0] in DURATIONS else 0
                 interval = map(float, response.interval[key][cell])
-                numbers = float(mean[cell]), *interval, fell, float(response.cut[cell])
+                numbers = float(mean[cell]), *interval, unfinished, float(response.cut[cell])
                 yield condition, response.change, SPRINGS[joint], phase, *PHASES[phase], *key, *numbers
 
 

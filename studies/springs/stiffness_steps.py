@@ -63,17 +63,21 @@ class PairedWalks:
     velocity: NDArray
     """(C, S) change of the CoM's forward velocity [m/s] at the end of the phase of a single change."""
     movement: NDArray
-    """(C, len(DURATIONS), S, K, len(MOVEMENT)) difference from the unchanged walk; NaN for walks that fall."""
+    """(C, len(DURATIONS), S, K, len(MOVEMENT)) difference from the unchanged walk; NaN for unfinished walks, which fell
+    or were too slow for K strides."""
     unchanged: NDArray
-    """(S, K, len(MOVEMENT)) the unchanged walk; NaN, like all results of that seed, where it falls."""
+    """(S, K, len(MOVEMENT)) the unchanged walk; NaN, like all results of that seed, where it is unfinished."""
     cut: NDArray
     """(C,) fraction of the changes that the range of the actions cuts short."""
 
     @property
-    def falls(self) -> NDArray:
-        """Return (C, len(DURATIONS)) the number of changed walks that fell although their unchanged walk did not."""
-        stood = np.isfinite(self.unchanged).all(axis=(1, 2))
-        return (np.isnan(self.movement).any(axis=(3, 4)) & stood).sum(axis=2)
+    def unfinished(self) -> NDArray:
+        """Return (C, len(DURATIONS)) the number of unfinished walks with a change whose unchanged walk was finished.
+
+        C are the cells: joint and phase of the change.
+        """
+        finished = np.isfinite(self.unchanged).all(axis=(1, 2))
+        return (np.isnan(self.movement).any(axis=(3, 4)) & finished).sum(axis=2)
 
 
 def action_step(settings: BipedSettings, body: Body, change: float) -> NDArray:
@@ -278,22 +282,23 @@ class _Record:
             for side in np.flatnonzero((phase >= begin) & (phase < end)):
                 self._samples[cell, index] += 1.0, -torque[side, joint], *acceleration[side, joint]
 
-    def paired(self, strides: int, active: NDArray, cut: NDArray) -> PairedWalks:
+    def paired(self, strides: int, finished: NDArray, cut: NDArray) -> PairedWalks:
         """Return the differences of each changed walk from the unchanged walk of its seed.
 
-        `strides` is K, `active` (N,) is True for walks that stayed up, `cut` as in `PairedWalks`.
+        `strides` is the number of strides, `finished` (N,) True for walks that completed them, `cut` as in
+        `PairedWalks`.
         """
         series = _Series(*(np.stack(ticks) for ticks in zip(*self._ticks, strict=True)))
         # Movement of each walk; the unchanged ones come first, and their mean strides are the clock of all.
-        movement = np.full((len(active), strides, len(MOVEMENT)), np.nan)
+        movement = np.full((len(finished), strides, len(MOVEMENT)), np.nan)
         clocks = np.zeros((self._num, strides))
-        for index in range(len(active)):
+        for index in range(len(finished)):
             seed = index % self._num
             first_stride = TICK * np.argmax(series.stride[:, seed] == 0)
             contacts = foot_contacts(series.load[:, index], self._biped.body)
             landed = contacts[LEFT].heel_strikes
             landed = landed[landed > first_stride - PHASE_LAG][: strides + 1]
-            if not active[index] or len(landed) <= strides:
+            if not finished[index] or len(landed) <= strides:
                 continue
             if index == seed:
                 clocks[seed] = np.linspace(landed[0], landed[-1], strides + 1)[1:]
@@ -306,13 +311,13 @@ class _Record:
         at_ends = velocity[ends, :, np.arange(self._num)]  # (phases, S, copies)
         one_stride = 1 + np.arange(len(CELLS)) * len(DURATIONS)  # copy with each cell's change of one stride
         phase_index = [list(PHASES).index(name) for _, name in CELLS]
-        stood = np.isfinite(movement[0]).all((1, 2))
-        # Means over the sampled windows, and the acceleration's integral over the phase of one leg.
-        windows, sums = np.split(self._samples, [1], axis=-1)
-        mean = sums / np.where(stood[:, None], windows, np.nan)
+        complete = np.isfinite(movement[0]).all((1, 2))  # seeds whose unchanged walk is finished
+        # Means over the samples, and the acceleration's integral over the phase of one leg.
+        counts, sums = np.split(self._samples, [1], axis=-1)
+        mean = sums / np.where(complete[:, None], counts, np.nan)
         return PairedWalks(
-            fixed=np.concatenate([mean, mean[..., 1:] * windows * TICK / len(SIDES)], -1),
-            velocity=np.where(stood, at_ends[phase_index, :, one_stride] - at_ends[phase_index, :, 0], np.nan),
+            fixed=np.concatenate([mean, mean[..., 1:] * counts * TICK / len(SIDES)], -1),
+            velocity=np.where(complete, at_ends[phase_index, :, one_stride] - at_ends[phase_index, :, 0], np.nan),
             movement=(movement[1:] - movement[0]).reshape(len(CELLS), len(DURATIONS), *movement.shape[1:]),
             unchanged=movement[0],
             cut=cut,

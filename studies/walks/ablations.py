@@ -275,7 +275,7 @@ class Ablations(WalkingStudy):
     def total(self) -> float:
         """Return the simulated time of all walks if none falls [s]."""
         trained = len(self.only or ABLATIONS) * self.seeds
-        inputs = len(INPUTS) + 1  # 1: the ankle's angle
+        inputs = len(INPUTS) + 1  # 1: the row of the ankle's angle alone
         fixed_springs = 1 + (self.constant is not None)  # the thesis's lines, the constant
         rows = trained + inputs + fixed_springs
         conditions = 2  # undisturbed, pushed

@@ -123,7 +123,7 @@ def _worst_against_best(strength: float) -> Effect:
     return effect
 
 
-def _less_at_250(measured: Measured) -> bool:
+def _saves_less_at_250(measured: Measured) -> bool:
     """Return True if the exoskeleton saves less at 250 N m/rad than at 50."""
     dearer = measured[250.0][FIBRE] - measured[50.0][FIBRE]
     dearer = dearer[np.isfinite(dearer)]
@@ -196,7 +196,7 @@ EXPERIMENTS: dict[str, Experiment | str] = {
         speed=1.25,
         effect=change(FIBRE, 50.0, 0.0),
         beside={f"{k:g} N·m/rad": change(FIBRE, k, 0.0) for k in (100.0, 150.0, 250.0)},
-        also={"less at 250 than at 50": _less_at_250},
+        also={"less at 250 than at 50": _saves_less_at_250},
     ),
     "toe_pushoff": _flexible_toe(
         "right_push_off_J_kg", note=f"locked is {LOCKED_TOE:g} N·m/rad; ankle and toe, {_WHOLE_STRIDE}"

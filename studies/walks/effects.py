@@ -8,7 +8,7 @@ of the effort beside it. Conditions of an effect walk the same episodes, so each
 """
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -157,7 +157,7 @@ def effect_row(
         if any(not np.array_equal(values[person], efforts[person]) for person in values):  # the effect is of energy
             row["effort"] = _mean(list(efforts.values()))
     else:
-        notes.append(f"no episode has all numbers: {', '.join(_unknown(measured.values(), walks.values()))}")
+        notes.append(": ".join(["no episode has all numbers", *_without_numbers(measured.values(), walks.values())]))
     row |= {"walked_m_s": _walked(measured.values()), "falls": _share([one for own in walks.values() for one in own])}
     row |= {"beside": "; ".join(f"{name} {_text(value)}" for name, value in beside.items()) or None}
     row |= {"note": "; ".join(filter(None, notes)) or None}
@@ -186,15 +186,26 @@ def _walked(measured: Any) -> str:
     return " to ".join(dict.fromkeys(f"{end:.2f}" for end in (min(speeds), max(speeds)))) if speeds else MISSING
 
 
-def _unknown(measured: Any, walks: Any) -> list[str]:
-    """Return, in words, the conditions without a number and how they walk."""
-    told = []
-    for key in dict.fromkeys(key for one in measured for key in one if not len(_known(one[key][FIBRE]))):
-        rows = [row for own in walks for row in own if row["condition"] == key]
+def _without_numbers(measured: Iterable[Measured], walks: Iterable[Sequence[Row]]) -> list[str]:
+    """Return one sentence on the conditions of which no episode of a person has a fibre work, and the speeds that they
+    walk; none where each condition has one in some episode.
+
+    `measured` and `walks` have an entry for each person.
+    """
+    together = [row for of_person in walks for row in of_person]
+    missing = dict.fromkeys(
+        condition
+        for of_person in measured
+        for condition, numbers in of_person.items()
+        if not len(_known(numbers[FIBRE]))
+    )
+    clauses = []
+    for condition in missing:
+        rows = [row for row in together if row["condition"] == condition]
         speeds = [row["walked_m_s"] for row in rows if row["walked_m_s"] is not None]
         how = f"walks {min(speeds):.2f} to {max(speeds):.2f} m/s" if speeds else "always falls"
-        told.append(f"{_label(key)} {how}")
-    return told
+        clauses.append(f"{_label(condition)} {how}")
+    return [", ".join(clauses)] if clauses else []
 
 
 def _share(walks: Sequence[Row]) -> str:

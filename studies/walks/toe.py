@@ -101,7 +101,7 @@ class ToeJoint(PersonsStudy):
         asked = [(toe, {**given, "speed": speed}) for (toe, given), speed in product(TOES.items(), self._asked())]
         walks = {person: list(map(with_foot, walked_rows(under, person, asked, progress))) for person in self.persons}
         speeds = (0.9,) if self.quick else WALKED_SPEEDS
-        even = {speed: {person: measured_at(speed, own) for person, own in walks.items()} for speed in speeds}
+        even = {speed: {person: toes_at_speed(speed, own) for person, own in walks.items()} for speed in speeds}
         compared = [row for speed, measured in even.items() for row in compared_rows(speed, measured)]
         shown = speeds[len(speeds) // 2]
         beside = [row for speed, measured in even.items() for row in beside_rows(speed, measured)]
@@ -144,8 +144,8 @@ def with_foot(row: Row) -> dict[str, Any]:
     return {**row, FOOT_WORK: None if None in parts else sum(parts)}
 
 
-def measured_at(speed: float, walks: Sequence[Row]) -> Measured:
-    """Return the numbers of each toe and episode of a person where it walks at a `speed` [m/s]."""
+def toes_at_speed(speed: float, walks: Sequence[Row]) -> Measured:
+    """Return a person's numbers by toe and episode, interpolated between its walks to a walked `speed` [m/s]."""
     names = (*EFFECT_NUMBERS, FOOT_WORK)
     return by_condition(at_walked_speeds(walks, ("condition", "episode"), (speed,), names), TOES, names)
 

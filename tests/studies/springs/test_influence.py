@@ -76,7 +76,7 @@ def test_a_walk_that_falls_is_counted_and_left_out_of_its_cell():
     fallen = walks()
     fallen.movement[4, 1, 2] = np.nan
     found, whole = summarise(fallen, 0.1), summarise(walks(), 0.1)
-    assert found.falls.sum() == found.falls[4, 1] == 1
+    assert found.unfinished.sum() == found.unfinished[4, 1] == 1
     assert found.mean[MANY_STRIDES_SPEED][4] == pytest.approx(whole.mean[MANY_STRIDES_SPEED][4], abs=1e-4)
     for cell in set(range(len(CELLS))) - {4}:
         assert found.mean[MANY_STRIDES_SPEED][cell] == whole.mean[MANY_STRIDES_SPEED][cell]

@@ -175,7 +175,7 @@ def test_walks_move_where_springs_carry_load_and_not_in_swing(pairs):
         assert np.abs(cell[joint, "swing"]).max() < 3e-4
     torque = walks.fixed[..., FIXED.index("torque_Nm")].mean(-1)
     assert torque[CELLS.index((0, "heel-off"))] == pytest.approx(7.6, abs=0.5)  # N m, a tenth of the spring's own
-    assert not walks.falls.any() and not walks.cut.any()
+    assert not walks.unfinished.any() and not walks.cut.any()
 
 
 def test_the_impulse_is_acceleration_times_the_phase_and_foretells_the_velocity_at_its_end(pairs):

@@ -23,8 +23,8 @@ from springfoot.studies.walks.toe import (
     Toe,
     beside_rows,
     compared_rows,
-    measured_at,
     toe_table,
+    toes_at_speed,
     verdict,
     with_foot,
 )
@@ -65,7 +65,7 @@ def test_planted_differences_at_equal_walked_speed_are_paired_by_start_and_told_
             "walked_m_s": speed - 0.1 * (toe == Toe(SOUND_ANKLES, TOE_LOCKED)),
         }
 
-    measured = {name: measured_at(1.05, planted(dearer(by))) for name, by in (("one", 0.5), ("two", 0.7))}
+    measured = {name: toes_at_speed(1.05, planted(dearer(by))) for name, by in (("one", 0.5), ("two", 0.7))}
     row = found(compared_rows(1.05, measured), Toe(SOUND_ANKLES, TOE_LOCKED), FIBRE)
     # The locked toe walks 0.1 m/s slower than commanded: at equal speed it costs 0.2 more than at equal command.
     assert (row["one"], row["two"], row["difference"]) == pytest.approx((0.7, 0.9, 0.8))
@@ -76,7 +76,7 @@ def test_planted_differences_at_equal_walked_speed_are_paired_by_start_and_told_
 
 def test_a_toe_on_which_nobody_walks_has_no_numbers_but_its_falls():
     rows = planted(lambda *_: {}, fallen={Toe(SOUND_ANKLES, TOE_ABSENT)})
-    measured = {"one": measured_at(1.1, rows)}
+    measured = {"one": toes_at_speed(1.1, rows)}
     compared = compared_rows(1.1, measured)
     row = found(compared, Toe(SOUND_ANKLES, TOE_ABSENT), FIBRE)
     assert (row["mean"], row["difference"], row["low"], row["pairs"]) == (None, None, None, 0)
@@ -95,7 +95,7 @@ def test_published_directions_are_met_where_the_effect_is_planted():
             FIBRE: 3.0 + 0.3 * (toe == Toe(SOUND_ANKLES, "spring of 84")),
         }
 
-    rows = {row["effect"]: row for row in beside_rows(1.1, {"one": measured_at(1.1, planted(as_people))})}
+    rows = {row["effect"]: row for row in beside_rows(1.1, {"one": toes_at_speed(1.1, planted(as_people))})}
     assert set(rows) == set(BESIDE)
     assert rows["toe_pushoff"]["difference"] < 0.0 and rows["toe_pushoff"]["sign_is"] == "right"
     assert rows["stiff_foot_cost"]["difference"] == pytest.approx(10.0)
