@@ -15,8 +15,8 @@ LINK = re.compile(r"(!?)\[([^\]]+)\]\((?!https://)([^)]+)\)")
 """A picture or a link to a file of the repository: mark, text, path."""
 INSTALL = re.compile(r'pip install -e "\.(\[[^"]+\])"')
 """The command that installs a clone with extras."""
-PINS = " -c constraints.txt"
-"""Words of a command that pins versions by a file of the clone."""
+OF_A_CLONE = (" -c constraints.txt", ", in a clone")
+"""Words of a command or a sentence that are true of a clone alone."""
 PLACEHOLDER = "https://example.org"
 """Beginning of the repository's address as long as it has none."""
 
@@ -42,7 +42,10 @@ def linked(
         address = posixpath.normpath(posixpath.join(folder, path))
         return f"{mark}[{text}]({source}/{'raw' if mark else 'blob'}/{commit}/{address})"
 
-    return LINK.sub(absolute, INSTALL.sub(r'pip install "springfoot\1"', page).replace(PINS, ""))
+    page = INSTALL.sub(r'pip install "springfoot\1"', page)
+    for words in OF_A_CLONE:
+        page = page.replace(words, "")
+    return LINK.sub(absolute, page)
 
 
 def index_page(source: str | None, version: str) -> str:

@@ -98,7 +98,7 @@ def _modules() -> tuple[Any, Any]:
         import mujoco_warp  # pyright: ignore[reportMissingImports]  # optional
         import warp  # pyright: ignore[reportMissingImports]  # optional
     except ImportError as error:
-        raise SpringfootError(f"needs mujoco_warp: pip install springfoot[gpu] ({error})") from None
+        raise SpringfootError(f"needs mujoco_warp: pip install 'springfoot[gpu]' ({error})") from None
     warp.config.log_level = warp.LOG_WARNING  # or it names every kernel it compiles
     return warp, mujoco_warp
 

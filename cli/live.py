@@ -1,5 +1,6 @@
 """Define the command that walks a policy live in a browser: `springfoot live`."""
 
+import socket
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,7 +10,7 @@ import tyro
 
 from springfoot.command_line import exit_code, parse
 from springfoot.envs.settings.settings import BipedSettings
-from springfoot.errors import MOST_COUNT, require_count, require_number
+from springfoot.errors import MOST_COUNT, SpringfootError, quoted, require_count, require_number
 from springfoot.evaluation.live.refused import LIVE_REFUSES
 from springfoot.studies.base.flags import EVALUATED, given, optional_flags
 
@@ -51,6 +52,7 @@ def run_live(flags: LiveFlags) -> None:
     """Print the page's address, walk until the time is over, and print how many pictures a second were shown."""
     require_count("seed", flags.seed, 0, MOST_COUNT)
     require_count("port", flags.port, 0, MOST_PORT)
+    _require_own_address(flags.host)
     if flags.seconds is not None:
         require_number("seconds", flags.seconds, 0.0, unit="s", above=True)
     if sys.stderr.isatty():
@@ -68,3 +70,15 @@ def run_live(flags: LiveFlags) -> None:
     finally:
         view.stop()
     print(f"{rate:.0f} pictures a second")
+
+
+def _require_own_address(host: str) -> None:
+    """Raise `SpringfootError` for a `host` on which this machine cannot listen: the server would wait for ever."""
+    try:
+        family, *_ = socket.getaddrinfo(host, 0, type=socket.SOCK_STREAM)[0]
+        with socket.create_server((host, 0), family=family):
+            pass
+    except (OSError, ValueError):
+        raise SpringfootError(
+            f"host must be an address of this machine, as 127.0.0.1, or 0.0.0.0 for all of them, got {quoted(host)}"
+        ) from None

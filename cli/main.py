@@ -96,6 +96,8 @@ STUDIES = {
 """Name of each study on the command line -> its class, imported when asked for, and its question."""
 ASKED_BY_USERS = ("compare", "landscape", "identify", "orthosis", "prosthesis", "drop-foot")
 """Studies that help lists; `--all` lists the others too, most of which made tables of this project's docs."""
+_EXTRA_OF_COMMAND = {"train": "train", "live": "live", "datasets": "minari"}
+"""Command that needs all of an extra, which brings `evaluate` -> that extra."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -168,8 +170,8 @@ def _run(words: list[str]) -> int:
         if error.name not in EXTRA_OF:
             raise
         extra = EXTRA_OF[error.name]
-        if words[0] == "train" and extra == "evaluate":
-            extra = "train"  # `train` needs all of its extra, which brings `evaluate`
+        if extra == "evaluate":
+            extra = _EXTRA_OF_COMMAND.get(words[0], extra)
         print(f"springfoot {words[0]}: error: {missing(error.name, extra)}", file=sys.stderr)
         return 2
     *others, last = COMMANDS

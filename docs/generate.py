@@ -51,7 +51,7 @@ def settings() -> str:
     for theme, words in THEMES.items():
         names = [name for name, its in THEME_OF.items() if its == theme]
         parts += [f"## {theme.capitalize()}", words, _names(head, list(_rows(BipedSettings, names)))]
-    parts += ["## Training", "Flags of `train.py`.", _names(head, list(_rows(TrainingConfig)))]
+    parts += ["## Training", "Flags of `springfoot train`.", _names(head, list(_rows(TrainingConfig)))]
     return "\n\n".join(parts)
 
 

@@ -12,7 +12,7 @@ MADE = {
     "pretrained": ("Walks on level ground at 1.2 m/s, and goes on when it is pushed.", PRETRAINED_BY, "walk"),
     "medium": (
         "Walks, and lags behind when pushed: a training stopped early, for sets of offline learning.",
-        "python train.py --push-newton 250 --timesteps 500000 --out runs/medium",
+        "springfoot train --push-newton 250 --timesteps 500000 --out runs/medium",
         "walk",
     ),
     "predicted": ("Walks by a plan that knows no person's curves.", "springfoot study predict", "prediction"),

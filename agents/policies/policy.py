@@ -55,7 +55,7 @@ SHIPPED = {
     "learned": person_file("learned"),
 }
 """Name of a policy of this package -> its file; `policy_card` describes each."""
-PRETRAINED_BY = "python train.py --push-newton 250 --timesteps 14000000 --out runs/pretrained"
+PRETRAINED_BY = "springfoot train --push-newton 250 --timesteps 14000000 --out runs/pretrained"
 """Command that made `pretrained` from nothing."""
 POLICY_SUFFIXES = (".safetensors", ".onnx")
 """Ends of the names of policies' files."""
@@ -173,10 +173,10 @@ def find_policy(name: str | Path) -> Path:
     if str(name) in SHIPPED:
         path = SHIPPED[str(name)]
         if not path.is_file():
-            raise SpringfootError(f"this installation of springfoot has no {name} policy; train one: train.py")
+            raise SpringfootError(f"this installation of springfoot has no {name} policy; train one: springfoot train")
     elif path.is_dir():
         if not (path / BEST).is_file():
-            raise SpringfootError(f"{name} is a folder without {BEST}, so not a run of train.py")
+            raise SpringfootError(f"{name} is a folder without {BEST}, so not a run of springfoot train")
         path /= BEST
     elif not path.is_file():
         raise SpringfootError(

@@ -433,7 +433,9 @@ def test_only_the_users_own_words_run_code(tmp_path):
         walk += f"try: load_policy({name})\nexcept ValueError as error: print(error)\n"
     done = subprocess.run([sys.executable, "-c", walk], cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
-    assert done.stdout.splitlines()[0] == "evil:act is a folder without best.safetensors, so not a run of train.py"
+    assert (
+        done.stdout.splitlines()[0] == "evil:act is a folder without best.safetensors, so not a run of springfoot train"
+    )
     assert done.stdout.splitlines()[1].startswith("no policy other:act: give ")
     assert not (tmp_path / "ran").exists()
 

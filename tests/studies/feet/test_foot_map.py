@@ -23,27 +23,30 @@ def test_a_person_who_is_told_a_sound_foot_sees_what_it_sees_on_one():
     assert (biped.observe()[:, feet] != seen[1][:, feet]).any()  # the environment's own stays
 
 
-def walked(told, falls, speed, fibre):
-    return {"foot": "rigid", "told": told, "episodes": 4, "falls": falls, "speed_m_s": speed, "fibre_J_kg_m": fibre}
+def walked(told, falls, speed, fibre, effort):
+    numbers = {"speed_m_s": speed, "fibre_J_kg_m": fibre, "effort": effort}
+    return {"foot": "rigid", "told": told, "episodes": 4, "falls": falls} | numbers
 
 
-def test_numbers_are_of_feet_without_a_fall_either_way():
+def test_prices_are_of_all_feet_walked_on_and_what_knowing_is_worth_of_those_walked_on_either_way():
     rows = [
-        walked(TOLD[0], 0.0, 1.2, 3.0),
-        walked(TOLD[0], 0.25, 1.0, 9.0),
-        walked(SOUND_FOOT, 0.0, 1.1, 3.5),
-        walked(SOUND_FOOT, 0.5, 1.0, 9.0),
+        walked(TOLD[0], 0.0, 1.2, 3.0, 0.8),
+        walked(TOLD[0], 0.0, 1.0, 4.0, 1.0),
+        walked(TOLD[0], 0.25, 1.0, 9.0, 9.0),
+        walked(SOUND_FOOT, 0.0, 1.1, 3.3, 0.9),
+        walked(SOUND_FOOT, 0.5, 1.0, 9.0, 9.0),
+        walked(SOUND_FOOT, 0.0, 1.0, 9.0, 9.0),
     ]
-    assert "| rigid | 1 of 8 / 2 of 8 | 1.20 / 1.10 | 3.00 / 3.50 |" in map_table(rows)
-    fallen = [walked(told, 1.0, None, None) for told in TOLD]
-    assert "| rigid | 4 of 4 / 4 of 4 | – | – |" in map_table(fallen)
+    assert "| rigid | 1 of 12 / 2 of 12 | 1.10 | 3.50 | 0.90 | +10% (feet: 1) |" in map_table(rows)
+    fallen = [walked(told, 1.0, None, None, None) for told in TOLD]
+    assert "| rigid | 4 of 4 / 4 of 4 | – | – | – | – |" in map_table(fallen)
 
 
 def test_flat_stiffness_has_a_row_for_each():
     rows = [{"ankle_N_m_rad": 50.0, "episodes": 2, "falls": 0.5, "speed_m_s": None, "fibre_J_kg_m": None}]
     rows.append({"ankle_N_m_rad": 600.0, "episodes": 2, "falls": 0.0, "speed_m_s": 1.2, "fibre_J_kg_m": 3.0})
-    text = flat_table(rows)
-    assert "| 50 | 1 of 2 | – | – |" in text and "| 600 | 0 of 2 | 1.20 | 3.00 |" in text
+    text = flat_table([row | {"effort": row["speed_m_s"] and 0.7} for row in rows])
+    assert "| 50 | 1 of 2 | – | – | – |" in text and "| 600 | 0 of 2 | 1.20 | 3.00 | 0.70 |" in text
 
 
 @pytest.mark.slow
