@@ -2,10 +2,11 @@
 
     python -m benchmarks.cheating
 
-For each seed two trainings of one task, one of them charged for the work of its fibres (`fibre_work`). Of the walks of
-both are measured the reading, which is that term, and the truth: the energy of every physics step with the muscles'
-smooth force. Both stand over the commanded way, over which a slower walk is cheaper, whatever the price: so both
-trainings are charged for a speed that is not held, too.
+For each seed two trainings of one task, in which the policy moves the legs and sets the stiffness, one of them charged
+for the work of its fibres (`fibre_work`). Of the walks of both are measured the reading, which is that term, and the
+truth: the energy of every physics step with the muscles' smooth force. Both stand over the commanded way, over which a
+slower walk is cheaper, whatever the price: so both trainings are charged for a speed that is not held, too. A learner
+whose reading hardly falls has not tried to cheat, and decides nothing. The old term `effort` is told beside.
 """
 
 import sys
@@ -27,6 +28,7 @@ from springfoot.envs.batch.step_result import Tick
 from springfoot.envs.physics.model import JOINTS, SIDES
 from springfoot.envs.physics.muscles import leg_strengths
 from springfoot.envs.physics.timing import PHYSICS_STEP, PHYSICS_STEPS_PER_WINDOW
+from springfoot.envs.settings.settings import Acts
 from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.evaluation.recording.recording import TICK
 from springfoot.gait import GRAVITY
@@ -35,6 +37,8 @@ from springfoot.gait.plan.effort import MuscleUse, muscle_use
 
 STRICTEST = 1.05
 """Largest truth with the charge over that without, divided by the same of the reading; chosen."""
+LEAST_FALL = 0.1
+"""Smallest fall of the reading that decides; chosen: a truth that stayed would then stand 1.11 times too high."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,7 +49,9 @@ class Cheating:
     """Seeds of the trainings."""
     timesteps: int = 500_000
     """Steps of each training."""
-    charge: float = -1.0
+    acts: Acts = "both"
+    """What the policy acts on."""
+    charge: float = -2.0
     """Weight of `fibre_work`."""
     held: float = -10.0
     """Weight of `speed_held`, in both trainings."""
@@ -57,17 +63,17 @@ class Cheating:
     """Threads of the physics in the trainings, 0 for one per processor."""
 
 
-def replayed(biped: Biped, act: PolicyFunction, windows: int) -> tuple[NDArray, NDArray, list[Tick], float]:
+def replayed(biped: Biped, act: PolicyFunction, windows: int) -> tuple[NDArray, NDArray, list[Tick], NDArray]:
     """Walk one body for a number of control windows, fewer if it falls, and its physics again step by step.
 
     Returns:
         torque of the actuators (T, side, joint) [N m] and angle (T + 1, side, joint) [rad] of every physics step, the
-        ticks of the walk, and the mean of the reward's term `fibre_work` in its second half.
+        ticks of the walk, and (2,) means of the reward's terms `fibre_work` and `effort` in its second half.
     """
     replay = biped.data(0)
     controls: list[NDArray] = []
     ticks: list[Tick] = []
-    paid: list[float] = []
+    paid: list[list[float]] = []
 
     def keep(tick: Tick) -> None:
         ticks.append(tick)
@@ -78,7 +84,7 @@ def replayed(biped: Biped, act: PolicyFunction, windows: int) -> tuple[NDArray, 
     for _ in range(windows // biped.windows_per_step):
         step = biped.step(act(observation))
         observation = step.observation
-        paid.append(step.info["reward/fibre_work"][0])
+        paid.append([step.info[f"reward/{term}"][0] for term in ("fibre_work", "effort")])
         if step.terminated[0]:
             break
     torque: list[NDArray] = []
@@ -90,7 +96,7 @@ def replayed(biped: Biped, act: PolicyFunction, windows: int) -> tuple[NDArray, 
             torque.append(replay.qfrc_actuator[3:].copy())
             angle.append(replay.qpos[3:].copy())
     shape = -1, len(SIDES), len(JOINTS)
-    return np.reshape(torque, shape), np.reshape(angle, shape), ticks, float(np.mean(paid[len(paid) // 2 :]))
+    return np.reshape(torque, shape), np.reshape(angle, shape), ticks, np.mean(paid[len(paid) // 2 :], 0)
 
 
 def finely_used(biped: Biped, torque: NDArray, angle: NDArray, windows: int) -> MuscleUse:
@@ -117,6 +123,8 @@ class Prices:
 
     reading: float
     """The reward's term, over the commanded way [-]."""
+    effort: float
+    """The term `effort`, likewise [-]."""
     truth: float
     """Energy of every physics step, over the commanded way [-]."""
     walked: float
@@ -134,7 +142,7 @@ def prices(policy: Path, how: Cheating) -> Prices:
     for seed in range(how.episodes):
         biped = Biped(settings, 1)
         biped.reset(np.array([0]), [seed])
-        torque, angle, ticks, reading = replayed(biped, act, windows)
+        torque, angle, ticks, terms = replayed(biped, act, windows)
         if len(ticks) < windows:
             falls += 1
             continue
@@ -144,16 +152,17 @@ def prices(policy: Path, how: Cheating) -> Prices:
         way = ticks[-1].measurement.com[0, 0] - ticks[windows // 2].measurement.com[0, 0]
         weight = biped.body.mass * GRAVITY
         spent = energy.energy.sum() / weight
-        found.append((reading, spent / commanded, spent / way, way / (how.seconds / 2)))
-    reading, truth, walked, speed = np.mean(found, 0).tolist() if found else [np.nan] * 4
-    return Prices(reading=reading, truth=truth, walked=walked, speed=speed, falls=falls)
+        found.append((*terms, spent / commanded, spent / way, way / (how.seconds / 2)))
+    reading, effort, truth, walked, speed = np.mean(found, 0).tolist() if found else [np.nan] * 5
+    return Prices(reading=reading, effort=effort, truth=truth, walked=walked, speed=speed, falls=falls)
 
 
 def learned(how: Cheating, seed: int, charge: float) -> Prices:
     """Train, and measure the last policy."""
     preset = PRESETS["walk"]
     weights = {"speed_held": how.held, "fibre_work": charge}
-    task = replace(preset.environment, reward_weights=dict(preset.environment.reward_weights) | weights)
+    weights = dict(preset.environment.reward_weights) | weights
+    task = replace(preset.environment, reward_weights=weights, acts=how.acts)
     with tempfile.TemporaryDirectory() as place:
         run = Path(place, "run")
         train(replace(preset, seed=seed, timesteps=how.timesteps, threads=how.threads, environment=task), run)
@@ -161,15 +170,18 @@ def learned(how: Cheating, seed: int, charge: float) -> Prices:
 
 
 def main(how: Cheating) -> int:
-    """Compare; 0 if in every seed the truth falls as the reading does, else 1."""
+    """Compare; 0 if in every seed the truth falls as the reading does, and that by `LEAST_FALL` or more, else 1."""
     kept = True
     for seed in how.seeds:
         free, charged = (learned(how, seed, charge) for charge in (0.0, how.charge))
         for words, price in (("free", free), ("charged", charged)):
             print(f"seed {seed}, {words}: {price}", flush=True)
-        ratio = (charged.truth / free.truth) / (charged.reading / free.reading)
-        print(f"seed {seed}: reading x {charged.reading / free.reading:.3f}, ratio {ratio:.3f}", flush=True)
-        kept = kept and ratio <= STRICTEST and not free.falls and not charged.falls
+        reading, effort, truth = (
+            getattr(charged, name) / getattr(free, name) for name in ("reading", "effort", "truth")
+        )
+        print(f"seed {seed}: reading x {reading:.3f}, effort x {effort:.3f}, ratio {truth / reading:.3f}", flush=True)
+        decides = reading <= 1.0 - LEAST_FALL and not free.falls and not charged.falls
+        kept = kept and decides and truth / reading <= STRICTEST
     return 0 if kept else 1
 
 
