@@ -63,21 +63,23 @@ class Face:
         return self._camera
 
     def _close_camera(self) -> None:
+        """Close the camera, if it is open; the next picture opens another one."""
         if self._camera is not None:
             self._camera.close()
             self._camera = None
 
 
 def spaces_of(biped: Biped) -> tuple[Box, Box]:
-    """Return observation and action space of one environment."""
+    """Return the spaces of one environment: observations (D,) within their bounds, and actions (A,) in [-1, 1]."""
     low = biped.observation_low
     high = biped.observation_high
     return Box(low, high, dtype=np.float32), Box(-1.0, 1.0, (len(biped.action_names),), np.float32)
 
 
 def check_options(options: dict[str, Any] | None, further: tuple[str, ...] = ()) -> dict[str, Any]:
-    """Return the options of a reset, none for None; raise `SpringfootError` for an unknown one or a bad start.
+    """Return the options of a reset, an empty dictionary for None.
 
+    Raises `SpringfootError` for an unknown option and for a bad start; the values of the others are not checked here.
     `further` are names of options beside `start` and those of `GIVEN`, which this interface allows.
     """
     options = {} if options is None else options
@@ -93,8 +95,9 @@ def check_options(options: dict[str, Any] | None, further: tuple[str, ...] = ())
 
 
 def given_walkers(options: dict[str, Any], num: int) -> dict[str, NDArray]:
-    """Return bodies, speeds and feet in the options of a reset, by the names of `GIVEN`: (N,), N being `num`.
+    """Return name of `GIVEN` -> (N,) values of the bodies, speeds and feet that the options of a reset set; N is `num`.
 
+    Names that are not among the options are left out.
     Raises `SpringfootError` for a value that is neither a number (a foot) nor one for each environment.
     """
     given = {}

@@ -146,13 +146,16 @@ class SegmentedFootBipedVector(  # pyright: ignore[reportIncompatibleVariableOve
         self._close_camera()
 
     def _start_values(self) -> NDArray:
+        """Return the numbers of the info right after a reset, (N, len(INFO)), as `StepResult.values`."""
         return report_start(self.biped.measurement, self.biped.leg_phase, self.biped.controlled)
 
     def _restart(
         self, ids: NDArray, start: float | str | None = None, given: Mapping[str, NDArray] | None = None
     ) -> None:
-        """Begin episodes in environments `ids` (K,); `start` as in the options, `given` (N,) by the names of
-        `GIVEN`."""
+        """Begin episodes in environments `ids` (K,); `start` is the option of a reset, None for the setting.
+
+        `given` is name of `GIVEN` -> (N,) values in place of drawn ones.
+        """
         given = {name: values[ids] for name, values in (given or {}).items()}
         self.biped.reset(ids, [None] * len(ids), start, given)  # each goes on with its generator
 

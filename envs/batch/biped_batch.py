@@ -97,18 +97,18 @@ class Biped(ExactState):
         self.target = walk_at_speed.target
         self.plan = walk_at_speed.plan
         self.constants = walk_at_speed.constants
-        table = [row for of_body in walks for row in rows(of_body)]
+        table_rows = [row for of_body in walks for row in rows(of_body)]
         speeds = np.array([walk.speed for walk in self.walks])
         self.subjects = Subjects(settings, speeds, num_envs, variant, len(self.constants))
         self._worn = WornFeet(settings, feet or [settings.feet] * num_envs)
         self._incline = slope_table(slope_constants()).table
-        self._legs = LegController(table, self.subjects)
-        planned, stiffness = foot_tables(settings, table)
+        self._legs = LegController(table_rows, self.subjects)
+        planned, stiffness = foot_tables(settings, table_rows)
         # Tables have a row for each body, variant and speed.
         rest = planned if rest is None else np.tile(np.repeat(rest, len(speeds), axis=0), (len(walks), 1, 1))
         self._springs = FootSprings(settings, rest, stiffness, self.subjects, self._worn)
         self._decisions = DecisionTimes(settings, self.target, self.subjects.rows)
-        self._start = start_table(table)
+        self._start = start_table(table_rows)
         starts_or_stops = settings.start == "standing" or settings.stop_at is not None
         self._standing = Standing(settings, self.subjects) if starts_or_stops else None
         self._simulation = Simulation(
@@ -123,7 +123,7 @@ class Biped(ExactState):
         )
         self._person = PersonActions(settings, self.subjects.rows)
         self._learned = None if settings.person == "tuned" else LearnedPerson(settings.person, settings.guide)
-        self._task = Task(settings, table, self.subjects, self._simulation.feet)
+        self._task = Task(settings, table_rows, self.subjects, self._simulation.feet)
         self._ground = Ground(settings, self._simulation, self.subjects, self._task.rows)
         self._noise = SensorNoise(settings.sensor_noise, self._task.rows)
         self._pushes = Pushes(settings, self.subjects, self._task.rows)
@@ -138,7 +138,7 @@ class Biped(ExactState):
         forces = np.zeros((self.windows_per_step, num_envs, len(SIDES), len(CONTACTS), 2))
         self._control = np.zeros((num_envs, len(SIDES), len(JOINTS), 2))
         self._rows = tuple(EnvironmentRows(self.subjects.rows, self._task.rows, forces, self._control))
-        self._tables = self._made_tables()
+        self._tables = self._kernel_tables()
         self._physics = tuple(self._simulation.arrays)
         self._kept = {"control": self.subjects.rows, "task": self._task.rows} | self._simulation.kept
         if settings.drawn_bodies is not None:
@@ -151,7 +151,7 @@ class Biped(ExactState):
         return self._simulation.model
 
     def model_of(self, index: int) -> MjModel:
-        """Return the compiled model of environment `index`'s body."""
+        """Return the compiled model of the body and feet that environment `index` has now; do not change it."""
         return self._simulation.models[index]
 
     @property
@@ -246,8 +246,8 @@ class Biped(ExactState):
                 noise[row] = self.settings.start_noise * random.standard_normal(noise.shape[1:])
             self._pushes.reset(index, random)
             randoms.append(random)
-        embodied = self.subjects.reset(ids, randoms, given)
-        self._fit(embodied, self._worn.put_on(ids.tolist(), self._worn.draw(randoms, given)))
+        new_bodies = self.subjects.reset(ids, randoms, given)
+        self._fit(new_bodies, self._worn.put_on(ids.tolist(), self._worn.draw(randoms, given)))
         self._legs.reset(ids, phase)
         self._ground.reset(ids, randoms, self._legs.phase)
         self._springs.reset(ids, [draw_delay(self.settings, random) for random in randoms])
@@ -261,10 +261,12 @@ class Biped(ExactState):
         place(self._simulation, self.subjects, ids, posture, noise)
         self._task.reset(ids, self._simulation.measure(ids).velocity)
 
-    def _fit(self, embodied: list[int], shod: list[int]) -> None:
-        """Give the environments `embodied` the bodies of their subjects, those `shod` their feet, and every leg its
-        commanded speed."""
-        if ids := sorted({*embodied, *shod}):
+    def _fit(self, new_bodies: list[int], new_feet: list[int]) -> None:
+        """Fit simulation, task and springs to environments with a changed body or changed feet, given by their indices.
+
+        The gains of all legs follow the commanded speeds.
+        """
+        if ids := sorted({*new_bodies, *new_feet}):
             bodies = [self.subjects.bodies[index] for index in ids]
             self._simulation.fit(ids, bodies, [self._worn.pairs[index] for index in ids])
             self._task.fit(ids)
@@ -272,11 +274,12 @@ class Biped(ExactState):
         self._legs.follow()
 
     def _fit_springs(self, ids: list[int]) -> None:
+        """Fit the foot springs to the feet of environments `ids`, and the kernels' tables to new torque-angle lines."""
         if self._springs.fit(ids):
-            self._tables = self._made_tables()
+            self._tables = self._kernel_tables()
 
-    def _made_tables(self) -> tuple[Any, ...]:
-        """Return the tables of the kernels, `Tables`."""
+    def _kernel_tables(self) -> tuple[Any, ...]:
+        """Return the curves over the stride for the kernels: `Tables`, as a plain tuple."""
         return tuple(
             Tables(
                 rest=self._springs.rest.table,
@@ -292,10 +295,10 @@ class Biped(ExactState):
         replaced = [OWN_FEET] * len(ids) if feet is None else self._worn.from_json(feet, len(ids))
         height, mass = (numbers[f"control.subject.{name}"] for name in ("height", "mass"))
         proportions = numbers.get("proportions", np.zeros(len(ids), int))
-        embodied = self.subjects.embody(ids, height, mass, proportions)
-        self._fit(embodied, self._worn.put_on(ids.tolist(), replaced))
+        new_bodies = self.subjects.embody(ids, height, mass, proportions)
+        self._fit(new_bodies, self._worn.put_on(ids.tolist(), replaced))
 
-    def _embodied(self, ids: NDArray) -> None:
+    def _rewrite_numbers(self, ids: NDArray) -> None:
         self._fit_springs(ids.tolist())  # lines of another batch may have other numbers
 
     def _feet_of(self, ids: NDArray) -> list[Any] | None:
@@ -345,14 +348,16 @@ class Biped(ExactState):
         factor = self._springs.factor(taken)
         # Where the setting `stiffness_by` has others set the stiffness, their factor takes the place of the action's.
         self._person.replace(factor, self._springs.factor_at_one, running, self._random)
-        # Until `_before_step` asks `Standing`, all bodies that run walk, and none with the fixed stiffness.
-        return _Step(running=running, ids=ids, factor=factor, of_person=of_person, walking=running, fixed=self._nobody)
+        # Until `_before_step` asks `Standing`, all bodies that run walk, and none with the schedule's stiffness.
+        return _Step(
+            running=running, ids=ids, factor=factor, of_person=of_person, walking=running, on_schedule=self._nobody
+        )
 
     def _before_step(self, step: "_Step") -> None:
         """Let bodies set off or stop, change speeds, push, set the stiffness and begin the first window."""
         if self._standing is not None:
             time = self._steps * self.dt
-            step.walking, step.fixed = self._standing.switch(self._simulation.arrays, time, step.running)
+            step.walking, step.on_schedule = self._standing.switch(self._simulation.arrays, time, step.running)
         if self.subjects.advance(self._steps, self._random, step.walking):
             self._legs.follow()
         if self.settings.push_newton:
@@ -361,7 +366,7 @@ class Biped(ExactState):
             self._move_person(step, 0)
         options = self._springs.options
         bodies = self._simulation.arrays.bodies
-        begin_step(self._rows, bodies, self._tables, options, step.factor, step.walking, step.fixed)
+        begin_step(self._rows, bodies, self._tables, options, step.factor, step.walking, step.on_schedule)
 
     def _move_person(self, step: "_Step", window: int) -> None:
         """Move the rest angles of hips, knees and ankles before control window number `window` of the step: by the
@@ -457,7 +462,7 @@ class _Step:
     """(N, 6) actions that move the person; None if they do not."""
     walking: NDArray
     """(N,) environments with moving springs and phase; the others stand or do not run."""
-    fixed: NDArray
-    """(N,) walking environments with the fixed stiffness."""
+    on_schedule: NDArray
+    """(N,) walking environments that take the schedule's stiffness in place of the action's."""
     window_start: dict[str, NDArray] | None = None
     """Fields of a `Tick` known at the beginning of a window, if someone listens."""

@@ -34,12 +34,12 @@ class ExactState(ABC):
         """
 
     @abstractmethod
-    def _embodied(self, ids: NDArray) -> None:
-        """Write anew the numbers of environments `ids` (K,) that depend on the batch, after a state's were put in."""
+    def _rewrite_numbers(self, ids: NDArray) -> None:
+        """Write again the numbers of environments `ids` (K,) that depend on the batch, over those of the state."""
 
     @abstractmethod
     def _feet_of(self, ids: NDArray) -> list[Any] | None:
-        """Return K pairs of feet in JSON values that replace those of environments `ids` (K,); None if none can."""
+        """Return K pairs of feet in JSON values that replace those of environments `ids` (K,); None if none do."""
 
     @property
     def generators(self) -> list[np.random.Generator | None]:
@@ -50,8 +50,8 @@ class ExactState(ABC):
     def state(self, ids: NDArray | None = None) -> dict[str, Any]:
         """Return the exact state of environments `ids` (K,), of all if None, between two steps.
 
-        Arrays (K, ...) by name, copies; and `generators`, K states of NumPy's bit generators in JSON values. Where feet
-        are drawn or given, `feet` are K pairs of them in JSON values, None for an environment's own.
+        Arrays (K, ...) by name, copies; and `generators`, K states of NumPy's bit generators in JSON values. Where a
+        reset draws or sets feet, `feet` are K pairs of them in JSON values, None for an environment's own.
         """
         chosen = np.arange(len(self._random)) if ids is None else ids
         generators = [None if random is None else random.bit_generator.state for random in self._random]
@@ -88,7 +88,7 @@ class ExactState(ABC):
         self._embody(chosen, restored, state.get(FEET))
         for name, values in numbers.items():
             values[chosen] = restored[name]
-        self._embodied(chosen)
+        self._rewrite_numbers(chosen)
         for index, generator_state in zip(chosen.tolist(), state["generators"], strict=True):
             self._random[index] = _generator(self._random[index], generator_state)
 
@@ -110,7 +110,7 @@ def _fields(name: str, rows: NDArray) -> Iterator[tuple[str, NDArray]]:
 
 
 def _generator(present: np.random.Generator | None, state: Mapping[str, Any] | None) -> np.random.Generator | None:
-    """Return a generator in `state`, that of a bit generator of NumPy's in JSON values; None for None.
+    """Return a generator in `state`, the state of a NumPy bit generator in JSON values; None for None.
 
     It is the `present` generator, put into that state, if that is of the same kind; else a new one.
     """

@@ -1,8 +1,8 @@
 """Let a learned person walk: a network in the step moves the rest angles of hips, knees and ankles every 20 ms.
 
 The network is a mirrored policy (`springfoot.agents.policies.policy`) of a training with `acts` "both" or "person". It
-acts by its mean action, on the observation without noise, told that others set the stiffness. Its sums run in one order
-for any number of bodies: the bits do not depend on the batch.
+acts by its mean action, on the observation without noise, with the entries for a stiffness that others
+set. Its sums run in one order for any number of bodies: the bits do not depend on the batch.
 """
 
 from itertools import pairwise
@@ -96,7 +96,7 @@ class LearnedPerson:
     """
 
     def __init__(self, name: str, guide: str) -> None:
-        network, settings, tensors = _read(person_file(name))
+        network, settings, tensors = _read_person(person_file(name))
         if settings.get("guide", "people") != guide:
             raise SpringfootError(f"person {name!r} was trained with guide {settings.get('guide')!r}, not {guide!r}")
         self._scale = radians(settings["person_range_deg"])
@@ -127,16 +127,16 @@ class LearnedPerson:
 
 
 def digest_of_person(name: str) -> str:
-    """Return the SHA-256 digest of a person's file."""
+    """Return the SHA-256 digest, as text, of the file of the person `name` (`person_file`)."""
     return digest_of_file(person_file(name))
 
 
 def _action_names(settings: dict[str, Any]) -> tuple[str, ...]:
-    """Return the names of a person's actions."""
+    """Return the names of a person's actions; with `acts` "both" those on the stiffness come first."""
     return ACTIONS + PERSON_ACTIONS if settings["acts"] == "both" else PERSON_ACTIONS
 
 
-def _read(path: Path) -> tuple[dict[str, Any], dict[str, Any], dict[str, NDArray]]:
+def _read_person(path: Path) -> tuple[dict[str, Any], dict[str, Any], dict[str, NDArray]]:
     """Return network and settings of a person's header, and its tensors; raise `SpringfootError` for another file."""
     header, tensors = read_tensors(path, "springfoot", "policy", POLICY_ENTRIES)
     try:

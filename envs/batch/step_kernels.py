@@ -8,6 +8,9 @@ next; `end_step` measures, judges and observes. Each part stands in the file of 
 
 Arrays travel as plain tuples and get their names inside: numba looks up a plain tuple's type in C, a named one's in
 Python, which costs more than the kernels of one body (`python -m benchmarks.named_tuples`).
+
+Axes: N environments; W control windows of a step; a `PhaseTable` (R, SAMPLES, 2, C) has R rows, one for each body,
+variant of the leg constants and tabulated speed, SAMPLES phases, value and rise to the next phase, and C curves.
 """
 
 from typing import NamedTuple
@@ -107,7 +110,7 @@ def _average_forces(tasks, forces, running) -> None:
 
 
 @kernel
-def begin_step(rows, bodies, tables, springs, factor, walking, fixed) -> None:
+def begin_step(rows, bodies, tables, springs, factor, walking, on_schedule) -> None:
     """Set the stiffness and begin the first control window.
 
     Args:
@@ -117,7 +120,7 @@ def begin_step(rows, bodies, tables, springs, factor, walking, fixed) -> None:
         springs: (N,) of `SPRING_OPTIONS`.
         factor: (N, 4) factors of the actions on the stiffness [-].
         walking: (N,) bool, environments with moving springs and phase.
-        fixed: (N,) bool, walking environments with the fixed stiffness.
+        on_schedule: (N,) bool, walking environments that take the schedule's stiffness in place of the action's.
     """
     stiffen(
         EnvironmentRows(*rows).controls,
@@ -126,7 +129,7 @@ def begin_step(rows, bodies, tables, springs, factor, walking, fixed) -> None:
         springs,
         factor,
         walking,
-        fixed,
+        on_schedule,
     )
     begin_window(rows, bodies, tables, springs, walking)
 

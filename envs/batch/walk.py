@@ -25,8 +25,8 @@ def walked_steps(biped: Biped, act: Callable[[NDArray], NDArray], steps: int | N
     """Step `biped`, which was reset, until every episode has ended; yield after each step.
 
     Args:
-        biped: N environments. Its `on_tick` hears every control window.
-        act: observations (N, D) -> actions (N, 4).
+        biped: N environments. Its `on_tick` is called after every control window.
+        act: observations (N, D) -> actions (N, A), as `Biped.step` takes them.
         steps: most steps of an episode, in place of the length in the settings.
     """
     active = np.ones(biped.num_envs, bool)

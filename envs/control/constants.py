@@ -133,7 +133,7 @@ def leg_constants(
     name = constants_name(equilibrium, cadence, feedforward=feedforward, follows_plan=follows_plan)
     if file is not None:
         return constants_at(_sets_of(file, name), speed)
-    table = _committed()
+    table = _package_constants()
     if follows_plan and name not in table:
         raise SpringfootError(
             f"there are no tuned leg constants for guide 'plan' and cadence {cadence!r}; it must be 'people'"
@@ -198,18 +198,18 @@ def _from_json(kind: type[Constants], values: Any) -> Constants:
             continue
         value = values[name]
         if hint is float:  # one number; all other fields are tuples
-            checked[name] = _within(name, value)
+            checked[name] = _checked_number(name, value)
             continue
         item_hints = get_args(hint)
         count = len(KNOTS) if Ellipsis in item_hints else len(item_hints)  # `tuple[float, ...]` has one for each knot
         if not isinstance(value, (list, tuple)) or len(value) != count:
             raise SpringfootError(f"{name} must be {count} numbers")
-        checked[name] = tuple(_within(name, number) for number in value)
+        checked[name] = tuple(_checked_number(name, number) for number in value)
     return kind(**checked)
 
 
-def _within(name: str, value: Any) -> float:
-    """Return the value of the constant `name` as a float.
+def _checked_number(name: str, value: Any) -> float:
+    """Return `value`, of the constant `name`, as a float.
 
     Raises `SpringfootError` below `LEAST_STIFFNESS`, and beyond `LARGEST_CONSTANT` in either direction.
     """
@@ -225,12 +225,12 @@ def _sets_of(file: Path, name: str) -> dict[float, LegConstants]:
         raise SpringfootError(f"{file} has no leg constants {name!r}: {error}") from None
 
 
-def _committed() -> dict[str, dict]:
-    """Return name -> the package's leg constants, in JSON form."""
+def _package_constants() -> dict[str, dict]:
+    """Return name (`constants_name`) -> leg constants of the package, in JSON form."""
     return _file()["constants"]
 
 
 @cache
 def _file() -> dict[str, dict]:
-    """Return the content of the package's file of constants."""
+    """Return the content of the package's file of constants, `legs.json`; cached: do not change it."""
     return json.loads(resources.files("springfoot.envs.control").joinpath("legs.json").read_text(encoding="utf-8"))

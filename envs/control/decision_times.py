@@ -25,7 +25,7 @@ def _take(actions, running, events, rows):
     """Decide the actions that take effect: new ones where a leg has passed an event since its last decision.
 
     Args:
-        actions: (N, 4) actions as given.
+        actions: (N, 4) actions of the policy, not clipped.
         running: (N,) bool; other bodies keep their actions.
         events: (E,) stride phases at which a leg decides; none for decisions in every step.
         rows: (N,) of `CONTROL_ROW`; `decision` is changed.

@@ -70,8 +70,9 @@ def foot_tables(settings: BipedSettings, rows: Iterable[tuple[LegConstants, Refe
 
 
 def fixed_stiffness(constants: LegConstants, body: Body, plateaus: tuple[float, ...] = PLATEAUS) -> NDArray:
-    """Return ankle and toe stiffness (SAMPLES, 2) [N m/rad] of the fixed schedule, part of the tuned `constants`, for
-    `body`; the ankle's five values hold on the `plateaus`.
+    """Return the tuned schedule of ankle and toe stiffness over the stride, (SAMPLES, 2) [N m/rad], for `body`.
+
+    It is a part of `constants`: five values of the ankle, on the `plateaus`, and a constant one of the toe.
     """
     toe = np.full(len(GRID), constants.toe_schedule)
     return np.stack([plateau_curve(constants.ankle_schedule, plateaus), toe], axis=-1) * body.stiffness_scale

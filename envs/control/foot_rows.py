@@ -65,9 +65,9 @@ def device(row, feet, theta, side, joint) -> Any:
 def foot_lines(feet: Sequence[Feet]) -> FootLines:
     """Return the tables of the devices of N pairs of feet, each line and each schedule once.
 
-    Without devices of a kind its table has one row, which no foot names: kernels take no empty tables.
+    A table without devices of its kind has one row that no foot uses: kernels take no empty tables.
     """
-    tables = _tables(feet)
+    tables = _torque_lines(feet)
     schedules = _schedules(feet)
     most_points = max([2, *map(len, tables)])  # a line has two at least, also the empty one
     lines = np.full((max(len(tables), 1), most_points, 3), np.inf)
@@ -79,7 +79,7 @@ def foot_lines(feet: Sequence[Feet]) -> FootLines:
     return FootLines(lines, PhaseTable(np.stack(curves)).table)
 
 
-def _tables(feet: Sequence[Feet]) -> list[tuple[tuple[float, float], ...]]:
+def _torque_lines(feet: Sequence[Feet]) -> list[tuple[tuple[float, float], ...]]:
     """Return the torque-angle lines (angle [rad], torque [N m]) of the devices of all feet, each once."""
     joints = [joint for pair in feet for foot in pair for joint in foot.joints]
     return list(dict.fromkeys(joint.device.table for joint in joints if joint.device and joint.device.table))
@@ -90,19 +90,19 @@ def _schedules(feet: Sequence[Feet]) -> list[StiffnessSchedule]:
     return list(dict.fromkeys(foot.schedule for pair in feet for foot in pair if foot.schedule))
 
 
-def has_lines_of(known: Sequence[Feet], feet: Sequence[Feet]) -> bool:
-    """Return whether the tables of the `known` pairs have every line and every schedule of these `feet`."""
-    return {*_tables(known)} >= {*_tables(feet)} and {*_schedules(known)} >= {*_schedules(feet)}
+def has_lines_of(tabulated: Sequence[Feet], feet: Sequence[Feet]) -> bool:
+    """Return whether the tables of the pairs `tabulated` (`foot_lines`) have each line and each schedule of `feet`."""
+    return {*_torque_lines(tabulated)} >= {*_torque_lines(feet)} and {*_schedules(tabulated)} >= {*_schedules(feet)}
 
 
-def foot_rows(settings: BipedSettings, feet: Sequence[Feet], known: Sequence[Feet] | None = None) -> NDArray:
+def foot_rows(settings: BipedSettings, feet: Sequence[Feet], tabulated: Sequence[Feet] | None = None) -> NDArray:
     """Return the muscles and devices of N pairs of feet, (N,) of `FOOT`; `settings` say which joints actions set.
 
-    `known` are the pairs that the tables were made of (`foot_lines`), these `feet` by default.
+    `line` and `curve` are rows of the tables that `foot_lines` made of the pairs `tabulated`, of `feet` if None.
     """
     rows = np.zeros(len(feet), FOOT)
-    tables = _tables(known or feet)
-    schedules = _schedules(known or feet)
+    tables = _torque_lines(tabulated or feet)
+    schedules = _schedules(tabulated or feet)
     rows["line"] = -1  # no line, no schedule
     rows["curve"] = -1
     set_by_actions = [settings.stiffness_joints in ("both", name) for name in ("ankle", "toe")]

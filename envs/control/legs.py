@@ -3,7 +3,8 @@
 Each hip and knee is a spring like the ankle (variable impedance) around the target's curves at the walking speed, with
 its moments fed forward. The stance hip also holds the trunk and the speed. A touchdown resets the phase. `legs.json`
 holds the constants, found by searches, and the command of each. Gains are for 1.70 m and 63 kg and scale with the body
-(see `envs.physics.model`).
+(see `envs.physics.model`). Axes: N bodies; side, 0 left and 1 right; a `PhaseTable` (R, SAMPLES, 2, C) has R rows,
+phases, value and rise to the next phase, and C curves.
 """
 
 from collections.abc import Sequence
@@ -65,7 +66,7 @@ def _between(low, high, weight):
 
 
 @kernel
-def _follow(constants, rows):
+def _compute_gains(constants, rows):
     """Compute the gains of N bodies from the `constants` (R,) of `GAINS` of the settings' body, one for each row of the
     tables.
 
@@ -93,10 +94,10 @@ def _follow(constants, rows):
 
 
 @part
-def _too_fast(m, row):
+def _speed_excess(m, row):
     """Return by how much the CoM moves forward faster than planned [m/s], at least `SLOWEST`.
 
-    `m` is the measurement of one body, `row` of `CONTROL_ROW`.
+    `m` is of `MEASURED`, `row` of `CONTROL_ROW`.
     """
     return max(m.com_velocity[0] - row.subject.speed * row.legs.planned_speed, SLOWEST)
 
@@ -125,7 +126,7 @@ def drive(rows, bodies, control, table, incline) -> None:
         for side in range(2):
             read(table, subject.place, legs.phase[side], curves[side])
         legs.planned_speed = curves[LEFT, PLANNED_SPEED]
-        too_fast = _too_fast(m, rows[i])
+        too_fast = _speed_excess(m, rows[i])
         # A stance hip holds trunk and speed by a torque; a swing hip's target shifts, so that the foot lands elsewhere.
         trunk = -gain.trunk_stiffness * (m.base[2] - gain.pitch) - gain.trunk_damping * m.base_velocity[2]
         stance_torque = trunk + gain.speed_torque * too_fast
@@ -173,7 +174,7 @@ def advance(rows, bodies, walking) -> None:
         m = bodies[i].measured
         gain = legs.gains
         left = legs.phase[LEFT]
-        rate = gain.rate * (1.0 + gain.rate_gain * _too_fast(m, rows[i]))
+        rate = gain.rate * (1.0 + gain.rate_gain * _speed_excess(m, rows[i]))
         end = (0.5 if left < 0.5 else 1.0) - HOLD  # of the right leg's stride, or of the left leg's
         left = min(left + max(rate, 0.0), max(end, left))  # never backwards, and not beyond `end`
         right = (left + 0.5) % 1.0
@@ -203,15 +204,15 @@ class LegController:
         self.follow()
 
     def follow(self) -> None:
-        """Compute the gains anew for the present bodies and commanded speeds of the subjects."""
-        _follow(self._constants, self._subjects.rows)
+        """Compute the gains of all bodies anew, for their present sizes and commanded speeds."""
+        _compute_gains(self._constants, self._subjects.rows)
 
     def reset(self, ids: NDArray, left_phase: NDArray) -> None:
         """Put the left legs of bodies `ids` (K,) at the stride phases `left_phase` (K,)."""
         self.phase[ids] = leg_phases(left_phase)
 
 
-def _gains(c: LegConstants, walk: ReferenceWalk) -> tuple[float, ...]:
+def _gains(constants: LegConstants, walk: ReferenceWalk) -> tuple[float, ...]:
     """Return the fields of `GAINS`, in their order: a leg's constants scaled to the settings' body."""
     body = walk.body
     stride_time = walk.plan.stride_time
@@ -219,14 +220,14 @@ def _gains(c: LegConstants, walk: ReferenceWalk) -> tuple[float, ...]:
     time_scale = sqrt(body.length_scale)
     return (
         TOUCHDOWN_LOAD * body.total_mass * GRAVITY,  # touchdown
-        CONTROL_WINDOW / (c.period_factor * stride_time),  # rate
-        c.period_speed_gain / time_scale,  # rate_gain
-        radians(c.trunk_pitch_deg) + body.trunk_lean + walk.plan.lean,  # pitch
-        c.trunk_stiffness * scale,
-        c.trunk_damping * scale * time_scale,
-        c.speed_torque * scale / time_scale,
-        c.swing_speed_gain / time_scale,  # swing_gain
-        c.swing_place_gain / body.length_scale,  # place_gain
+        CONTROL_WINDOW / (constants.period_factor * stride_time),  # rate
+        constants.period_speed_gain / time_scale,  # rate_gain
+        radians(constants.trunk_pitch_deg) + body.trunk_lean + walk.plan.lean,  # pitch
+        constants.trunk_stiffness * scale,
+        constants.trunk_damping * scale * time_scale,
+        constants.speed_torque * scale / time_scale,
+        constants.swing_speed_gain / time_scale,  # swing_gain
+        constants.swing_place_gain / body.length_scale,  # place_gain
         FARTHEST * body.length_scale,
     )
 

@@ -22,7 +22,7 @@ DRAWN_SOURCES = ("scaled", "constant", "random")
 
 
 def draw_source(settings: BipedSettings, random: np.random.Generator) -> tuple[int, int, int, NDArray]:
-    """Return the fields of `STIFFNESS_SOURCE` of one episode, drawn if the setting says so.
+    """Return the fields of `STIFFNESS_SOURCE` of one episode: others, scheduled, anew, and the (4,) `drawn` numbers.
 
     Draws nothing for the sources "action" and "schedule".
     """
@@ -71,16 +71,16 @@ class PersonActions:
         return self._range * np.clip(actions, -1.0, 1.0).reshape(-1, len(SIDES), len(MOVED))
 
     def move(self, offsets: NDArray, moving: NDArray, resting: NDArray) -> None:
-        """Move the rest angles of the bodies `moving` (N,) by `offsets` (N, side, 3) [rad]; those of bodies `resting`
-        (N,) go back."""
+        """Move the rest angles of the bodies `moving` (N,) by `offsets` (N, side, 3) [rad], those of bodies
+        `resting` (N,) by 0."""
         self._offset[moving] = offsets[moving]
         self._offset[resting] = 0.0
 
     def replace(self, factor: NDArray, ranges: NDArray, running: NDArray, randoms: Sequence) -> None:
-        """Replace the factors (N, 4) of the actions on the stiffness where the action does not set it.
+        """Write into `factor` the factors of the bodies whose stiffness others than the action set.
 
         Args:
-            factor: changed in place.
+            factor: (N, 4) factors of the actions on the stiffness [-], changed in place.
             ranges: (4,) factor at action 1 where no schedule sets the stiffness.
             running: (N,) bodies that take the step; a stiffness drawn anew is drawn for them.
             randoms: (N,) their generators.

@@ -76,7 +76,7 @@ class PhaseTable:
         """(R, SAMPLES, 2, C): value at each sample, and rise to the next sample; do not write to it."""
 
     def at(self, phase: ArrayLike, place: NDArray = _FIRST) -> NDArray:
-        """Return the curves (..., C) at phases (...) in [0, 1).
+        """Return the curves (..., C) at phases (...) in [0, 1), linear between samples and between two rows.
 
         `place` (N,) of dtype `PLACE` says the rows to read for phases (N, ...); by default all are of the first row.
         """

@@ -72,7 +72,7 @@ def reference_walk_at(
     body = body_of(settings)
     people = reference_gait(settings, speed)
     equal_speed = speed / sqrt(body.length_scale)
-    legs = legs or [_committed(settings, equal_speed)]
+    legs = legs or [_tuned_constants(settings, equal_speed)]
     if settings.follows_plan:
         style = least_work(equal_speed, plan_file_of(settings))
         plan = plan_walk(body, speed, settings.cadence, human=people, style=style)
@@ -93,7 +93,7 @@ def reference_walk_at(
     )
 
 
-def _committed(settings: BipedSettings, speed: float) -> LegConstants:
+def _tuned_constants(settings: BipedSettings, speed: float) -> LegConstants:
     """Return the tuned constants for the settings at `speed` [m/s at 1.70 m]."""
     named_by = settings.equilibrium, settings.cadence, speed, settings.feedforward, settings.follows_plan
     return leg_constants(*named_by, plan_file_of(settings))

@@ -4,7 +4,7 @@ Before a walk both feet stand side by side, and every joint is a stiff spring. T
 place over the feet; the hips keep the trunk upright. To set off, that place moves ahead until the body falls forward at
 `OFF_SPEED`; then the body walks, slowly at first. To stop, the commanded speed goes down to `SLOW_SPEED`; soon after
 the next touchdown the same springs hold the body as it is, one foot ahead of the other. Ankle and toe stiffness are
-those of these springs while the body stands, and those of the fixed schedule while it sets off and slows down. A policy
+those of these springs while the body stands, and those of the schedule while it sets off and slows down. A policy
 acts in the steady walk between, the only part of an episode that it has learnt.
 
 Lengths, times, speeds and gains are for 1.70 m and 63 kg and scale with the body (see `envs.physics.model`), but for
@@ -51,8 +51,8 @@ LEAN, LEAN_SECONDS = 0.30, 0.5
 OFF_SPEED, OFF_PHASE = 0.30, 0.16
 """Forward speed of the CoM at which the body begins to walk [m/s], and the stride phase of its stance leg then [-]."""
 OFF_SECONDS, EARLY_SECONDS = 1.0, 2.0
-"""Longest time from the start of the lean to the start of the walk [s]; least time of walking with the fixed stiffness,
-which lasts until the commanded speed is reached [s]."""
+"""Longest time from the start of the lean to the start of the walk [s]; least time of walking with the schedule's
+stiffness, which lasts until the commanded speed is reached [s]."""
 SLOW_SPEED = 0.9
 """Commanded speed at setting off, and at the end of slowing down before a stop [m/s]."""
 LANDED = (0.015, 0.06)
@@ -116,7 +116,7 @@ def _take_over_push(held, m):
     """Move the rest angles of the hips (`held.draw`) by a window's part, until the hips' torque takes over the push of
     the feet against each other.
 
-    `held` is of `HELD`, `m` the measurement of one body.
+    `held` is of `HELD`, `m` of `MEASURED`.
     """
     front = 0 if m.ankle[0, 0] > m.ankle[1, 0] else 1
     push = 0.0  # [N], half the difference of the feet's horizontal forces, positive if they push each other apart
@@ -209,9 +209,9 @@ class Standing:
         return angle, np.zeros_like(angle), pitch, np.zeros(len(ids))
 
     def switch(self, physics: Physics, time: NDArray, running: NDArray) -> tuple[NDArray, NDArray]:
-        """Let the `running` (N,) bodies for which it is time set off or stop, before a step at `time` (N,) [s].
+        """Let `running` (N,) bodies set off or stop where that is due, before a step at `time` (N,) [s].
 
-        Returns two masks (N,): running bodies that walk, and those of them that walk with the fixed schedule.
+        Returns two masks (N,): running bodies that walk, and those of them that walk with the schedule's stiffness.
         """
         mode = self._held["mode"]
         before = self._held["mode"].copy()
@@ -270,7 +270,7 @@ def off_phase(drawn: float) -> float:
 def standing_posture(body: Body, knee: float) -> tuple[float, ...]:
     """Return angles of thigh (to the vertical), knee, ankle and toe [rad] of a standing body with `knee` flexion [rad].
 
-    The feet are flat, and the CoM is `STAND_COM` ahead of the ankles.
+    The feet are flat, and the CoM is `STAND_COM` ahead of the ankles. Cached.
     """
 
     def com(shank: float) -> float:

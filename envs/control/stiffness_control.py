@@ -3,7 +3,8 @@ dtheta/dt).
 
 The springs of muscles have the K of the actions or of the schedule; a device in their place, such as a passive
 prosthetic foot, has its own, always: `foot_rows` has these springs, `envs.settings.feet` their numbers. Arrays (side,
-2) have ankle and toe along the last axis; flattened, they are in the order of `ACTIONS`.
+2) have ankle and toe along the last axis; flattened, they are in the order of `ACTIONS`. Other axes: N bodies; a
+`PhaseTable` (R, SAMPLES, 2, C) has R rows, phases, value and rise to the next phase, and C curves.
 """
 
 from collections.abc import Sequence
@@ -31,7 +32,7 @@ FEET = slice(ANKLE, None)
 
 
 def stiffness_ranges(settings: BipedSettings, body: Body) -> tuple[NDArray, NDArray]:
-    """Return lowest and highest stiffness of this body [N m/rad], each (2,) for ankle and toe."""
+    """Return the stiffness at an action of -1 and of 1 for this body [N m/rad], each (2,) for ankle and toe."""
     low, high = np.array([settings.ankle_stiffness_range, settings.toe_stiffness_range]).T
     return low * body.stiffness_scale, high * body.stiffness_scale
 
@@ -79,7 +80,7 @@ SPRING_OPTIONS = np.dtype(
 
 
 @part
-def stiffen(rows, bodies, schedule, options, factor, walking, fixed) -> None:
+def stiffen(rows, bodies, schedule, options, factor, walking, on_schedule) -> None:
     """Request new stiffness of the muscles at ankles and toes, to act after the delay.
 
     A body's first stiffness in an episode (`springs.fresh`) takes effect at once and does no work. Changing K to K'
@@ -92,7 +93,7 @@ def stiffen(rows, bodies, schedule, options, factor, walking, fixed) -> None:
         options: (N,) of `SPRING_OPTIONS`.
         factor: (N, 4) factors of the actions on the stiffness [-].
         walking: (N,) bool; the springs of other bodies do not change.
-        fixed: (N,) bool, the bodies that take the schedule in place of the action's stiffness.
+        on_schedule: (N,) bool, the bodies that take the schedule's stiffness in place of the action's.
     """
     scheduled = np.empty(2)
     for i in range(len(rows)):
@@ -108,8 +109,8 @@ def stiffen(rows, bodies, schedule, options, factor, walking, fixed) -> None:
                 if not walking[i]:
                     continue
                 of_source = rows[i].source.scheduled if rows[i].source.others else option.scheduled[joint]
-                base = scheduled[joint] if fixed[i] or of_source else option.middle[joint]
-                ratio = 1.0 if fixed[i] else factor[i, 2 * side + joint]
+                base = scheduled[joint] if on_schedule[i] or of_source else option.middle[joint]
+                ratio = 1.0 if on_schedule[i] else factor[i, 2 * side + joint]
                 if not rows[i].feet.muscles[side, joint]:
                     ratio = 0.0  # a device is in their place
                 before = springs.stiffness[side, joint]
@@ -345,8 +346,8 @@ class FootSprings:
         self._settings = settings
         self._subjects = subjects
         self._worn = worn or WornFeet(settings, [settings.feet] * num)
-        self._known = self._worn.known
-        self.feet = tuple(foot_lines(self._known))
+        self._tabulated = self._worn.known
+        self.feet = tuple(foot_lines(self._tabulated))
         """`FootLines`, as a plain tuple for kernels."""
         self._residual = settings.action_mode == "residual"
         _, factor = _log_scale(settings, subjects.bodies[0])
@@ -366,8 +367,10 @@ class FootSprings:
         self._springs["taut"] = 1.0
 
     def fit(self, ids: Sequence[int]) -> bool:
-        """Take over the present feet and proportions of environments `ids` (K,); return True if `feet` is another
-        one."""
+        """Compute options and rows anew for the feet and proportions that environments `ids` (K,) have now.
+
+        Returns True if their feet needed new tables, `feet`.
+        """
         tendon = np.inf if self._settings.ankle_tendon is None else TENDON_SHARE * self._settings.ankle_tendon
         for index in ids:
             body = self._subjects.table_body(index)
@@ -375,12 +378,12 @@ class FootSprings:
             scale = body.strength_scale  # a load makes neither tendon nor tissue stiffer
             self.options[["middle", "tendon", "tissue"]][index] = middle, tendon * scale, scale
         pairs = self._worn.pairs
-        new_lines = not has_lines_of(self._known, [pairs[index] for index in ids])
-        if new_lines:  # those of feet that a reset has given
-            self._known = [*self._worn.known, *pairs]
-            self.feet = tuple(foot_lines(self._known))
+        new_lines = not has_lines_of(self._tabulated, [pairs[index] for index in ids])
+        if new_lines:  # of feet that the options of a reset set
+            self._tabulated = [*self._worn.known, *pairs]
+            self.feet = tuple(foot_lines(self._tabulated))
             ids = range(len(pairs))
-        feet = foot_rows(self._settings, [pairs[index] for index in ids], self._known)
+        feet = foot_rows(self._settings, [pairs[index] for index in ids], self._tabulated)
         self._subjects.rows["feet"][list(ids)] = feet
         return new_lines
 
@@ -402,7 +405,8 @@ class FootSprings:
     def factor(self, action: NDArray) -> NDArray:
         """Return the factors (N, 4) of actions (N, 4) on the stiffness at action 0, or on the schedule.
 
-        Computed by NumPy: powers in a kernel would have other last bits.
+        Actions are in [-1, 1], in the order of `ACTIONS`. Computed by NumPy: powers in a kernel would have other last
+        bits.
         """
         return np.exp(action) if self._residual else self.factor_at_one**action
 

@@ -51,8 +51,8 @@ def _approach(most, running, subjects):
 
 
 @kernel
-def _locate(ids, speeds, first, subjects):
-    """Set the `place` of environments `ids` (K,) in tables over `speeds` (G,) [m/s], at their Froude-equal speeds.
+def _find_places(ids, speeds, first, subjects):
+    """Set the `place` of environments `ids` (K,) in tables over `speeds` (G,) [m/s], by their Froude-equal speeds.
 
     `first` (N,) is the first row of each environment's variant; `subjects` (N,) of `SUBJECT`.
     """
@@ -130,7 +130,7 @@ class Subjects:
         Args:
             ids: (K,) indices.
             randoms: K generators.
-            given: values (K,) in place of drawn ones, by the names of `GIVEN`; feet are left to others.
+            given: name of `GIVEN` -> values (K,) in place of drawn ones; feet among them are not read (`WornFeet`).
 
         Returns the indices of environments with a changed body, whose model must be rebuilt. Raises `SpringfootError`,
         leaving all state unchanged, for an impossible body or a speed outside the tables.
@@ -148,8 +148,8 @@ class Subjects:
         return changed
 
     def embody(self, ids: NDArray, height: NDArray, mass: NDArray, proportions: NDArray) -> list[int]:
-        """Give environments `ids` (K,) bodies of `height` (K,) [m], `mass` (K,) [kg] and `proportions` (K,); return the
-        indices of those with a changed body, as `reset` does."""
+        """Give environments `ids` (K,) bodies of `height` (K,) [m], `mass` (K,) [kg] and `proportions` (K,), indices in
+        `drawn_bodies`; return the indices of those with a changed body, as `reset` does."""
         if not set(proportions.tolist()) <= set(range(len(self._table_bodies))):
             raise SpringfootError(
                 f"the state does not fit: 'proportions' must be from 0 to {len(self._table_bodies) - 1}"
@@ -160,8 +160,10 @@ class Subjects:
         return self._embody(ids, bodies, proportions.tolist())
 
     def _embody(self, ids: NDArray, bodies: Sequence[Body], proportions: Sequence[int]) -> list[int]:
-        """Give environments `ids` (K,) these K bodies with the `proportions` (K,); return the indices of those with a
-        changed body."""
+        """Give environments `ids` (K,) these K bodies, `proportions` (K,) being indices in `drawn_bodies`.
+
+        Returns the indices of the environments with a changed body.
+        """
         changed = []
         self.proportions[ids] = proportions
         for index, body in zip(ids.tolist(), bodies, strict=True):
@@ -177,7 +179,7 @@ class Subjects:
     def command(self, ids: NDArray, speed: NDArray) -> None:
         """Let the commanded speed of environments `ids` (K,) go to `speed` (K,) [m/s], at the setting `speed_rate`."""
         for index, value in zip(ids.tolist(), speed.tolist(), strict=True):
-            self._check(self.bodies[index], value)
+            self._require_covered(self.bodies[index], value)
         self.target[ids] = speed
         self._speeds_move = True
 
@@ -211,7 +213,7 @@ class Subjects:
         return True
 
     def table_body(self, index: int) -> Body:
-        """Return the body of the tables for environment `index`: that of the settings, with its proportions."""
+        """Return the body for which the tables of environment `index` were made: the settings', of its proportions."""
         return self._table_bodies[self.proportions[index]]
 
     def check(self, given: Mapping[str, Any] | None) -> None:
@@ -247,7 +249,7 @@ class Subjects:
             except SpringfootError:
                 if draws_left == 1 or not drawn.keys() - given.keys():  # another draw would give the same body
                     raise
-        self._check(body, values["speed"])
+        self._require_covered(body, values["speed"])
         return body, proportions, values["speed"]
 
     def _next_change(self, time: float, random: np.random.Generator) -> float:
@@ -256,7 +258,7 @@ class Subjects:
         interval = self._settings.speed_interval
         return np.inf if interval is None else time + interval * random.uniform(0.5, 1.5)
 
-    def _check(self, body: Body, speed: float) -> None:
+    def _require_covered(self, body: Body, speed: float) -> None:
         """Raise `SpringfootError` for a speed that the tables do not cover for this body."""
         time_scale = sqrt(body.height / self._usual.height)
         low = self._speeds[0] * time_scale
@@ -268,6 +270,6 @@ class Subjects:
             )
 
     def _locate(self, ids: NDArray) -> None:
-        """Set the places in the tables of environments `ids` (K,)."""
+        """Set `place`, the rows of the tables to read, for the commanded speeds of environments `ids` (K,)."""
         first = (self.proportions * self._variants + self._variant) * len(self._speeds)
-        _locate(ids, self._speeds, first, self.rows["subject"])
+        _find_places(ids, self._speeds, first, self.rows["subject"])

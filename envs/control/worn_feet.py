@@ -41,10 +41,10 @@ class WornFeet:
     def draw(
         self, randoms: Sequence[np.random.Generator], given: Mapping[str, Sequence[Any]] | None = None
     ) -> list[FootPair]:
-        """Draw the feet of K environments from their generators; return the feet in place of the environments' own.
+        """Return K pairs of feet for environments, drawn by their generators; None for a foot of the environment's own.
 
-        `given` has K feet in place of drawn ones, by the names of `FOOT_SETTINGS`, checked or in plain JSON.
-        Feet are drawn there too, so that later draws do not depend on `given`.
+        `given` is name of `FOOT_SETTINGS` -> K feet in place of drawn ones, checked or in plain JSON. Those that it
+        replaces are drawn all the same, so that later draws do not depend on `given`.
         """
         chosen = [self.checked(name, (given or {}).get(name, [None] * len(randoms))) for name in FOOT_SETTINGS]
         replaced = []
@@ -54,7 +54,7 @@ class WornFeet:
         return replaced
 
     def checked(self, name: str, feet: Sequence[Any]) -> list[Any]:
-        """Return the feet that a reset or a saved state gives for `name`, one of `FOOT_SETTINGS`, checked; None stays.
+        """Return `feet` of a reset or a saved state as `FootSetting`s; None stays. `name` is one of `FOOT_SETTINGS`.
 
         Raises `SpringfootError` for feet that this batch cannot wear.
         """
@@ -68,7 +68,10 @@ class WornFeet:
         return chosen
 
     def put_on(self, ids: Sequence[int], replaced: Sequence[FootPair]) -> list[int]:
-        """Replace the own feet of environments `ids` (K,); return the indices of those whose feet changed."""
+        """Put the feet `replaced` (K,) on environments `ids` (K,), their own where None.
+
+        Returns the indices of the environments with a changed foot.
+        """
         changed = []
         for index, feet in zip(ids, replaced, strict=True):
             self._replaced[index] = feet
@@ -79,7 +82,7 @@ class WornFeet:
         return changed
 
     def to_json(self, ids: Sequence[int]) -> list[list[Any]]:
-        """Return the feet in place of the own ones of environments `ids` (K,), K pairs of plain JSON values."""
+        """Return the feet that replace those of environments `ids` (K,): K pairs in JSON values, None for none."""
         return [[foot and foot.to_json() for foot in self._replaced[index]] for index in ids]
 
     def from_json(self, pairs: Any, count: int) -> list[FootPair]:

@@ -132,11 +132,11 @@ def _sum_work(parts, steps, control, push, timestep, torque, work, energy):
     Args:
         parts: (N,) of `PARTS`.
         steps: `StepRecord`.
-        control: (N, 2, 4, 2), K and K theta_eq held in the window [N m/rad, N m].
+        control: (N, side, joint, 2), K and K theta_eq held in the window [N m/rad, N m].
         push: (N,) horizontal force on the trunk's CoM [N].
         timestep: time of a physics step [s].
-        torque: (N, 2, 4), of actuators and joint damping together.
-        work: (N, 2, 4, 2), positive and negative work of that torque.
+        torque: (N, side, joint), of actuators and joint damping together.
+        work: (N, side, joint, 2), positive and negative work of that torque.
         energy: (N,) of `LEDGER`.
     """
     count = steps.velocity.shape[1]
@@ -173,9 +173,9 @@ def _sum_changes(parts, control, control_before, angle, energy):
 
     Args:
         parts: (N,) of `PARTS`.
-        control: (N, 2, 4, 2), K and K theta_eq held in the window [N m/rad, N m].
+        control: (N, side, joint, 2), K and K theta_eq held in the window [N m/rad, N m].
         control_before: the same of the window before; NaN where there was none.
-        angle: (N, 2, 4) at the beginning of the window [rad].
+        angle: (N, side, joint) at the beginning of the window [rad].
         energy: (N,) of `LEDGER`.
     """
     for i in range(len(energy)):

@@ -54,7 +54,7 @@ class Spring:
 LOCK = Spring(stiffness=50_000.0, damping_time=0.01)
 """Spring that locks a joint at 0: 100 N m, an ankle's largest moment in walking, move it by 0.1 deg. Chosen: with a
 damping time of five physics steps or more, moments are as with any stiffer or softer lock (5 000 to 100 000 N
-m/rad). The price changes little: on a rigid right foot the learned person's fibre work is 3.58 J/kg/m at 20 000, 3.66
+m/rad). The fibre work changes little: on a rigid right foot that of the learned person is 3.58 J/kg/m at 20 000, 3.66
 here, 3.71 at 100 000 (63 kg, 1.2 m/s asked, 1.18, 1.20, 1.21 walked; 20 episodes of 5 s).
 
 MuJoCo solves contacts with the inertia M, and moves the joints by M + h K beta, h the physics step. Without an
@@ -80,12 +80,12 @@ class FootJoint:
 
     @property
     def has_muscles(self) -> bool:
-        """Return True without a device of either kind."""
+        """Return True for a joint without a device: neither a spring in place of muscles nor an adaptive device."""
         return self.device is None and self.rest is None
 
     @property
     def is_locked(self) -> bool:
-        """Return True if a lock holds it."""
+        """Return True for a joint whose device is `LOCK`."""
         return self.device == LOCK
 
 
@@ -126,7 +126,7 @@ SOUND: Feet = (INTACT, INTACT)
 
 
 def act_one_way(feet: Feet) -> bool:
-    """Return whether any orthosis of these feet acts one way."""
+    """Return whether the orthosis of either foot, at ankle or toe, acts in one direction alone."""
     return any(joint.orthosis is not None and joint.orthosis.engages for foot in feet for joint in foot.joints)
 
 

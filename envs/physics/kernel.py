@@ -29,8 +29,8 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 def kernel(function: Function) -> Function:
-    """Compile `function` with numba at its first call; dividing by zero gives infinity, as in NumPy."""
-    named = _named(function)
+    """Compile `function` with numba at its first call, and cache the code on disk; x / 0 is infinity, as in NumPy."""
+    named = _with_fingerprint(function)
     compiled: Any = njit(error_model="numpy")(named)
     try:
         compiled._cache = _KernelCache(named)
@@ -40,8 +40,8 @@ def kernel(function: Function) -> Function:
 
 
 def part(function: Function) -> Function:
-    """Compile, as `kernel` does, a function that only kernels call; it is kept with them and not by itself."""
-    compiled: Any = njit(error_model="numpy")(_named(function))
+    """Compile, as `kernel` does, a function that only kernels call; its code is cached as a part of theirs."""
+    compiled: Any = njit(error_model="numpy")(_with_fingerprint(function))
     return compiled
 
 
@@ -57,7 +57,7 @@ class _KernelCache(FunctionCache):
         self._cache_file: Any = _DigestedFile(self._cache_file)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Return the kept kernel; None if there is none or its files are damaged, which are then made anew."""
+        """Return the cached kernel; None if there is none, or if its files are damaged, which are then emptied."""
         try:
             return super().load_overload(sig, target_context)
         except Exception:  # what is cut short ends in any exception of pickle
@@ -66,7 +66,7 @@ class _KernelCache(FunctionCache):
             return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep a compiled kernel, if its files can be written."""
+        """Write a compiled kernel into the cache; warn if its files cannot be written."""
         try:
             super().save_overload(sig, data)
         except Exception as error:
@@ -81,12 +81,12 @@ class _DigestedFile:
         self._file = file
 
     def save(self, key: Any, data: Any) -> None:
-        """Keep a kernel."""
+        """Write a kernel under `key`, with its digest."""
         content = dumps(data)
         self._file.save(key, (sha256(content).digest(), content))
 
     def load(self, key: Any) -> Any:
-        """Return the kept kernel or None; raise `ValueError` for damage, and the errors of unpickling."""
+        """Return the kernel under `key`, or None; raise `ValueError`, or an error of unpickling, for a damaged one."""
         found = self._file.load(key)
         if found is None:
             return None
@@ -107,7 +107,8 @@ def _warn_of_compiling(reason: str) -> None:
     )
 
 
-def _named(function: Function) -> Function:
+def _with_fingerprint(function: Function) -> Function:
+    """Return `function` itself, with its fingerprint behind its qualified name, under which numba caches the code."""
     function.__qualname__ += f"_{_fingerprint(function)}"
     return function
 

@@ -124,8 +124,8 @@ def segments_of(body: Body, feet: Feet = SOUND) -> NDArray:
     mass = total_mass(body, feet)
     segments = np.zeros(1, SEGMENTS)
     segments["trunk"] = np.array(body.upper_moment) / mass
-    for side, own in enumerate(feet):
-        leg = leg_segments(body, own)
+    for side, foot_below in enumerate(feet):
+        leg = leg_segments(body, foot_below)
         thigh, shank, foot, toe = leg.mass
         # Thigh and shank point down from their joints; so their CoMs lie at negative heights.
         (_, thigh_com), (_, shank_com), (forward, up), (toe_com, _) = leg.com
@@ -155,7 +155,7 @@ def _turned(offset, c, s):
 
 
 @part
-def _locate(segments, position, rate, m):
+def _fill_kinematics(segments, position, rate, m):
     """Fill CoM, ankles and contact points of `m`, of `MEASURED`, and the CoM's velocity, by planar kinematics [m, m/s].
 
     Heights are above the origin of the world. `segments` of `SEGMENTS`; `position` and `rate` (11,), MuJoCo's
@@ -236,7 +236,7 @@ def _read_joints(segments, plant, m):
 
 
 @part
-def _average(sensors, force):
+def _fill_mean_forces(sensors, force):
     """Fill `force` (side, contact, 2), forward and up, with the mean over physics steps of each contact's force [N].
 
     `sensors` is (steps, side, contact, 3): forward, lateral, up [N].
@@ -266,7 +266,7 @@ def measure_bodies(bodies, state, sensors, velocity, warnings) -> None:
         bodies: (N,) of `BODY_ROW`; `measured` is filled, and the window added to `muscles`.
         state: (N, numbers) MuJoCo's, whose rows begin as `PLANT`.
         sensors: (N, S, side, contact, 3) contact forces of the window's S physics steps [N].
-        velocity: (N, S, D) velocities after these steps [m/s, rad/s].
+        velocity: (N, S, D) velocities of D degrees of freedom after these steps [m/s, rad/s].
         warnings: (N, kinds) how often MuJoCo has warned of each kind.
     """
     for i in range(len(bodies)):
@@ -277,9 +277,9 @@ def measure_bodies(bodies, state, sensors, velocity, warnings) -> None:
         for k in range(3):
             m.base[k], m.base_velocity[k] = plant.qpos[k], plant.qvel[k]
         _read_joints(segments, plant, m)
-        _locate(segments, plant.qpos, plant.qvel, m)
+        _fill_kinematics(segments, plant.qpos, plant.qvel, m)
         _make_relative_to_ground(bodies[i].ground, m)
-        _average(sensors[i], m.force)
+        _fill_mean_forces(sensors[i], m.force)
         work_muscles(bodies[i].muscles, m, segments, velocity[i], plant.control)
         m.diverged = -1
         for kind in range(warnings.shape[1] - 1, -1, -1):  # backwards, so that the lowest kind stays

@@ -80,7 +80,7 @@ def joints_of(foot: Foot) -> tuple[FootJoint, ...]:
 
 
 def damping_times_of(body: Body, feet: Feet) -> NDArray:
-    """Return beta [s] of the actuators of both legs, (side, joint)."""
+    """Return beta [s] of the actuators of both legs, (side, joint): a device's own, else that of muscles."""
     of_muscles = damping_times(body)
     times = []
     for foot in feet:
@@ -98,8 +98,8 @@ def torque_ranges(body: Body, feet: Feet) -> NDArray:
 
 
 def springs_of(model: mujoco.MjModel) -> tuple[NDArray, NDArray]:
-    """Return numbers of the joints' actuators in a compiled model: beta [s], (side, joint), and the lowest and highest
-    torque [N m], (side, joint, 2)."""
+    """Return two arrays for the actuators of a compiled model: beta [s], (side, joint), and lowest and highest torque
+    [N m], (side, joint, 2), infinite for a joint without limits."""
     legs = (len(SIDES), len(JOINTS))
     names = [f"{joint}_{side}" for side in SIDES for joint in JOINTS]
     beta = [-model.actuator(f"stiffness_{name}").gainprm[2] for name in names]
@@ -110,7 +110,8 @@ def springs_of(model: mujoco.MjModel) -> tuple[NDArray, NDArray]:
 
 
 def armatures_of(body: Body, feet: Feet) -> NDArray:
-    """Return the armature of the joints of both legs [kg m^2], (side, joint): that of muscles, a device's, a brace's.
+    """Return the armature of the joints of both legs [kg m^2], (side, joint): the sum of that of muscles, of a device
+    and of an orthosis.
 
     Damped springs without an armature of their own have h K beta / 2, h the physics step: contacts would else give the
     body energy, as with `envs.physics.foot.LOCK`.
@@ -134,8 +135,10 @@ def armatures_of(body: Body, feet: Feet) -> NDArray:
 
 
 def _inertia_for(spring: Spring, stiffness: float, usual_time: float) -> float:
-    """Return h K beta / 2 [kg m^2] of a spring of that stiffness [N m/rad]; `usual_time` [s] where it has no damping
-    time of its own."""
+    """Return the armature h K beta / 2 [kg m^2] of a spring: h is the physics step, K its `stiffness` [N m/rad].
+
+    beta is the spring's damping time, or `usual_time` [s] without one.
+    """
     beta = usual_time if spring.damping_time is None else spring.damping_time
     return 0.5 * PHYSICS_STEP * stiffness * beta
 
@@ -146,8 +149,8 @@ def passive_damping(body: Body) -> np.ndarray:
 
 
 def contact_material(body: Body, contact: NDArray, base: NDArray, angle: NDArray) -> NDArray:
-    """Return the forward coordinate [m] of the sole's material at the contact points, up to a constant: (T, side,
-    contact).
+    """Return the forward coordinate [m] of the sole's material at the contact points at T times, up to a constant:
+    (T, side, contact).
 
     The coordinate changes when a foot slides and stays when its spheres roll: it is the contact point's own plus radius
     times the angle by which the sphere has turned back.
@@ -223,8 +226,8 @@ def build_spec(
             _add_spring(spec, f"{joint}_{side}", float(beta))
     if one_way or act_one_way(feet):
         for side, foot in zip(SIDES, feet, strict=True):
-            for joint, own in zip(JOINTS[ANKLE:], foot.joints, strict=True):
-                _add_tendon(spec, f"{joint}_{side}", own.orthosis)
+            for name, joint in zip(JOINTS[ANKLE:], foot.joints, strict=True):
+                _add_tendon(spec, f"{name}_{side}", joint.orthosis)
     for side in SIDES:
         for contact in CONTACTS:
             spec.add_sensor(
@@ -250,7 +253,7 @@ def build_model(
     return spec.compile()
 
 
-def _load(trunk, body: Body) -> None:
+def _load(trunk: "mujoco.MjsBody", body: Body) -> None:
     """Add the body's load: a box on the back, fixed to the trunk."""
     forward, up = body.carried_com
     load = _segment(trunk, "load", (forward, 0, up), body.carried_mass, (0, 0), body.carried_inertia)
@@ -258,25 +261,25 @@ def _load(trunk, body: Body) -> None:
     box(load, size, visible=body.carried_ratio > 0.0)
 
 
-def _leg(trunk, body: Body, side: str, feet: Feet, hip_y: float) -> None:
+def _leg(trunk: "mujoco.MjsBody", body: Body, side: str, feet: Feet, hip_y: float) -> None:
     """Add the leg of `side` below the trunk; its lateral offset `hip_y` [m] is for the eye alone (the body is
     planar)."""
     shade = 0.15 if side == "left" else 0.0
     thin = 0.035 * body.length_scale
     drop = body.ankle_height - body.toe_joint_height
-    places = (
+    positions = (
         (0, hip_y, 0),
         (0, 0, -body.thigh_length),
         (0, 0, -body.shank_length),
         (body.ankle_to_toe_joint, 0, -drop),
     )
     worn = feet[SIDES.index(side)]
-    own = leg_segments(body, worn)
+    leg = leg_segments(body, worn)
     segments = []
     parent = trunk
     colour = FLESH if worn.kind == "intact" else DEVICE
-    for index, (name, place) in enumerate(zip(("thigh", "shank", "foot", "toe"), places, strict=True)):
-        parent = _segment(parent, f"{name}_{side}", place, own.mass[index], own.com[index], own.inertia[index])
+    for index, (name, position) in enumerate(zip(("thigh", "shank", "foot", "toe"), positions, strict=True)):
+        parent = _segment(parent, f"{name}_{side}", position, leg.mass[index], leg.com[index], leg.inertia[index])
         _hinge(parent, side, index, body, feet)
         segments.append(parent)
     thigh, shank, foot, toe = segments
@@ -291,7 +294,14 @@ def _leg(trunk, body: Body, side: str, feet: Feet, hip_y: float) -> None:
     bone(toe, (0, 0), offsets["toe"][:2], 0.5 * thin, shade, colour)
 
 
-def _segment(parent, name, pos, mass, com, inertia):
+def _segment(
+    parent: "mujoco.MjsBody",
+    name: str,
+    pos: tuple[float, float, float],
+    mass: float,
+    com: tuple[float, float],
+    inertia: float,
+) -> "mujoco.MjsBody":
     """Add a rigid segment to `parent` at `pos` (3,) [m], and return it.
 
     `mass` [kg]; `com` forward and up in its own frame [m]; `inertia` about the CoM [kg m^2].
@@ -304,7 +314,7 @@ def _segment(parent, name, pos, mass, com, inertia):
     return segment
 
 
-def _hinge(segment, side: str, index: int, body: Body, feet: Feet) -> None:
+def _hinge(segment: "mujoco.MjsBody", side: str, index: int, body: Body, feet: Feet) -> None:
     """Hang a segment of a leg on its joint, number `index` of `JOINTS`.
 
     The joint has the torque limits, damping, armature and stops of that leg, and its orthosis, if that acts both ways.

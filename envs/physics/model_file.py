@@ -38,7 +38,7 @@ def model_text(spec: mujoco.MjSpec) -> str:
     """Return the MJCF text of a specification with all digits; MuJoCo itself would keep six."""
     model = spec.compile()
     root = ElementTree.fromstring(spec.to_xml())
-    world = _found(root, "worldbody")
+    world = _first_element(root, "worldbody")
     bodies = list(world.iter("body"))  # in the order of the compiled model, whose first body is the world
     for index, body in enumerate(bodies, start=1):
         _write(body, model, index)
@@ -48,13 +48,13 @@ def model_text(spec: mujoco.MjSpec) -> str:
     for joint in world.iter("joint"):
         index = model.joint(joint.get("name", "")).id  # every joint has one coordinate
         _write(joint, model, index, LIMITS if model.jnt_limited[index] else {})
-    for index, geom in enumerate(_in_order(world)):
+    for index, geom in enumerate(_geoms_in_order(world)):
         _write(geom, model, index)
-    for index, pair in enumerate(_found(root, "contact").iter("pair")):
+    for index, pair in enumerate(_first_element(root, "contact").iter("pair")):
         _write(pair, model, index)
     for tendon in root.iter("fixed"):
         _write(tendon, model, model.tendon(tendon.get("name", "")).id)
-    for actuator in _found(root, "actuator"):
+    for actuator in _first_element(root, "actuator"):
         _write(actuator, model, model.actuator(actuator.get("name", "")).id)
     for index, key in enumerate(root.iter("key")):
         _write(key, model, index)
@@ -62,12 +62,13 @@ def model_text(spec: mujoco.MjSpec) -> str:
     return ElementTree.tostring(root, encoding="unicode") + "\n"
 
 
-def _in_order(body: ElementTree.Element) -> list[ElementTree.Element]:
+def _geoms_in_order(body: ElementTree.Element) -> list[ElementTree.Element]:
     """Return the geoms of a body element as the compiled model numbers them: its own, then those of its children."""
-    return body.findall("geom") + [geom for child in body.findall("body") for geom in _in_order(child)]
+    return body.findall("geom") + [geom for child in body.findall("body") for geom in _geoms_in_order(child)]
 
 
-def _found(root: ElementTree.Element, tag: str) -> ElementTree.Element:
+def _first_element(root: ElementTree.Element, tag: str) -> ElementTree.Element:
+    """Return the first element `tag` at or below `root`."""
     return next(root.iter(tag))
 
 
@@ -78,8 +79,9 @@ def _write(element: ElementTree.Element, model: MjModel, index: int, limits: Map
     """
     for attribute, array in {**ARRAY_OF[element.tag], **limits}.items():
         value: Any = getattr(model, array)[index]
-        element.set(attribute, " ".join(repr(float(number)) for number in _sequence(value)))
+        element.set(attribute, " ".join(repr(float(number)) for number in _numbers(value)))
 
 
-def _sequence(value: Any) -> Sequence[float]:
+def _numbers(value: Any) -> Sequence[float]:
+    """Return the numbers of one entry of a model's array: a list of one for a scalar entry."""
     return [value] if getattr(value, "ndim", 0) == 0 else list(value)

@@ -1,9 +1,9 @@
-"""Measure the work of the muscles of N bodies in each control window: the moment of their fibres, and its price.
+"""Measure the work of the muscles of N bodies in each control window: moment, work and cost of their fibres.
 
-The price is that of `springfoot.gait.plan.effort`, compiled. A window of 10 ms is one of its intervals: moments are
-means over the physics steps, work is their sum. The moments of single steps are no muscle's: rest angles are held for a
-window, so that torques are saw teeth. A window's price needs the moment of the next one too, so it is known one window
-later.
+The cost, metabolic energy and squared activation, is that of `springfoot.gait.plan.effort`, compiled. A
+window of 10 ms is one of its intervals: moments are means over the physics steps, work is their sum. The moments of
+single steps are no muscle's: rest angles are held for a window, so that torques are saw teeth. A window's cost needs
+the moment of the next one too, so it is known one window later.
 """
 
 import numpy as np
@@ -55,7 +55,7 @@ tissue_stiffness = part(ankle_tissue_stiffness)
 
 
 def muscles_of(body: Body, feet: Feet) -> NDArray:
-    """Return (1,) of `MUSCLES`, of a body on its feet."""
+    """Return the constants of the muscles of a body on these feet, (1,) of `MUSCLES`."""
     row = np.zeros(1, MUSCLES)
     row["tissue"] = body.strength_scale  # a load makes no tissue stiffer
     row["give"] = np.array(TENDON_GIVE) / body.strength_scale
@@ -74,8 +74,8 @@ def leg_strengths(body: Body, feet: Feet) -> NDArray:
 
 
 @part
-def _price_last_but_one(row):
-    """Add the price of the last window but one to the sums of the step."""
+def _add_cost_of_last_but_one(row):
+    """Add the cost of the last window but one to the sums `energy` and `activation` of `row`, of `MUSCLE_ROW`."""
     for side in range(2):
         for joint in range(4):
             moment = row.moment[1, side, joint]
@@ -95,7 +95,8 @@ def _price_last_but_one(row):
 def actuator_torque(segments, control, theta, theta_rate, side, joint) -> float:
     """Return the torque of one joint's actuators [N m]: of its spring, within the joint's limits.
 
-    `segments` is of `SEGMENTS`, `control` (side, joint, 2) K [N m/rad] and K theta_eq [N m]; `theta` [rad].
+    `segments` is of `SEGMENTS`, `control` (side, joint, 2) K [N m/rad] and K theta_eq [N m]; `theta` [rad] and
+    `theta_rate` [rad/s] are the joint's.
     """
     spring = control[side, joint, 1] - control[side, joint, 0] * (theta + segments.beta[side, joint] * theta_rate)
     return min(max(spring, segments.torque[side, joint, 0]), segments.torque[side, joint, 1])
@@ -109,8 +110,9 @@ def work_muscles(row, m, segments, velocity, control) -> None:
         row: of `MUSCLE_ROW`.
         m: of `MEASURED`, at the window's end.
         segments: of `SEGMENTS`.
-        velocity: (S, D) velocities after the window's physics steps [m/s, rad/s]. MuJoCo moves a joint by the velocity
-            after a step, so they give the angles, and these the torques: recording torques too would cost more.
+        velocity: (S, D) velocities of D degrees of freedom after the window's S physics steps [m/s, rad/s].
+            MuJoCo moves a joint by the velocity after a step, so they give the angles, and these the torques: recording
+            torques too would cost more.
         control: (side, joint, 2) K [N m/rad] and K theta_eq [N m] of the window; muscles without K do nothing.
     """
     if m.time <= row.time:
@@ -161,12 +163,14 @@ def work_muscles(row, m, segments, velocity, control) -> None:
                 row.delivered[0, side, joint, 1] = second + 0.5 * of_tissue * turn
     row.windows += 1
     if row.windows >= 3:
-        _price_last_but_one(row)
+        _add_cost_of_last_but_one(row)
 
 
 def forget(rows: NDArray, ids: NDArray | slice, angle: NDArray, velocity: NDArray) -> None:
-    """Let the muscles of `rows` (N,) of `MUSCLE_ROW` begin anew in simulations `ids` (K,), at joint angles `angle` and
-    velocities `velocity` (N, side, joint) [rad, rad/s]."""
+    """Set time, windows and sums of `rows` (N,) of `MUSCLE_ROW` to 0 in simulations `ids` (K,); the constants stay.
+
+    Their muscles begin at the joint angles `angle` and velocities `velocity` (N, side, joint) [rad, rad/s].
+    """
     for name in MUSCLE_ROW.names or ():
         if name != "muscles":
             rows[name][ids] = 0

@@ -96,12 +96,14 @@ class Camera:
 
 
 def _close(camera: "weakref.ref[Camera]") -> None:
+    """Close a camera as Python exits, if it still exists."""
     still_there = camera()
     if still_there is not None:
         still_there.close()
 
 
 def _renderer(model: mujoco.MjModel) -> Any:
+    """Return a renderer into arrays for a model; raise `SpringfootError` without OpenGL."""
     try:
         return mujoco.Renderer(model, HEIGHT, WIDTH)
     except Exception as error:  # each backend fails in its own way
@@ -133,4 +135,5 @@ def _open_window(model: mujoco.MjModel, data: mujoco.MjData) -> tuple[Any, list[
 
 
 def _first_line(error: Exception) -> str:
+    """Return the first line of an error's text, or the name of its class if it has no text."""
     return (str(error) or type(error).__name__).splitlines()[0]

@@ -1,6 +1,10 @@
 """Add the visible parts of the model that have neither mass nor contact: sky, light, bones, a load."""
 
+from collections.abc import Sequence
+
 import mujoco
+
+from springfoot.arrays import NDArray
 
 FLESH, DEVICE = (0.25, 0.45, 0.70), (0.42, 0.40, 0.30)
 """Colours of bones, and of those of a foot that is not intact."""
@@ -33,7 +37,14 @@ def add_scene(spec: mujoco.MjSpec) -> None:
     spec.worldbody.add_light(pos=(0, -2, 4), dir=(0, 0.4, -1), type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL)
 
 
-def bone(segment, start, end, radius: float, shade: float, colour: tuple[float, float, float] = FLESH) -> None:
+def bone(
+    segment: "mujoco.MjsBody",
+    start: Sequence[float],
+    end: Sequence[float],
+    radius: float,
+    shade: float,
+    colour: tuple[float, float, float] = FLESH,
+) -> None:
     """Add a capsule to a segment, from `start` to `end` (forward, up) in its frame [m]; `radius` [m].
 
     Its colour is lighter than `colour` by `shade` [0..1].
@@ -48,8 +59,8 @@ def bone(segment, start, end, radius: float, shade: float, colour: tuple[float, 
     )
 
 
-def box(segment, size, visible: bool = True) -> None:
-    """Add a box of half-lengths `size` (3,) [m] to a segment."""
+def box(segment: "mujoco.MjsBody", size: NDArray, visible: bool = True) -> None:
+    """Add a box of half-lengths `size` (3,) [m], forward, sideways and up, to a segment; unseen unless `visible`."""
     segment.add_geom(
         type=mujoco.mjtGeom.mjGEOM_BOX,
         size=size,

@@ -95,7 +95,7 @@ class Simulation:
             raise SpringfootError("a custom model must have the joints and the actuators of the default one")
         self._custom_model = model is not None
         if model is not None:
-            _require_known_steps(model)
+            _require_usable_steps(model)
         self._substeps = round(CONTROL_WINDOW / self.model.opt.timestep)
         self._batch = Batch(self.model, num, require_count("threads", threads, 1, MOST_THREADS))
         if len(built) > 1:
@@ -242,7 +242,10 @@ class Simulation:
                 values[ids] = recorded[name]
 
     def measure(self, ids: NDArray | slice = slice(None)) -> Measurement:
-        """Return the measurement after a reset of `ids`: their present state, no torques or contact forces."""
+        """Measure all simulations after a reset of `ids`, and return the measurement of all N, which changes in place.
+
+        Simulations `ids` get torques and contact forces of 0, and their muscles' sums begin anew.
+        """
         self.arrays.sensors[ids] = 0.0
         measure_bodies(*self.arrays)
         self.now.torque[ids] = 0.0
@@ -256,9 +259,9 @@ class Simulation:
         return data
 
 
-def _require_known_steps(model: MjModel) -> None:
+def _require_usable_steps(model: MjModel) -> None:
     """Raise `SpringfootError` unless the physics steps of a custom model fill a control window and move the joints by
-    the velocity after a step, which the price of the muscles takes for granted."""
+    the velocity after a step, as the work of the muscles takes for granted."""
     steps = CONTROL_WINDOW / model.opt.timestep
     if round(steps) < 1 or abs(steps - round(steps)) > 1e-9:
         raise SpringfootError(

@@ -42,11 +42,14 @@ class DrawnFoot:
 
     @cached_property
     def example(self) -> Foot:
-        """Return the foot with every range at its low end. All draws have its lines, schedule and one-way springs."""
+        """Return the foot with every range at its low end; cached. Draws differ from it in numbers alone."""
         return FootSetting(_end_of(self.foot, 0)).foot
 
     def draw(self, random: np.random.Generator) -> FootPair:
-        """Draw the side if the foot is for `one`, then its numbers in their order; return the feet."""
+        """Return a pair of feet, None on a leg that keeps the environment's own foot.
+
+        Draws the side where `on` is "one", then a number from each range, in the order of the dictionary.
+        """
         side = random.integers(2) if self.on == "one" else ("left", "right", "both").index(self.on)
         foot = FootSetting(_with_numbers(self.foot, partial(_draw_number, random)))
         return ((foot, None), (None, foot), (foot, foot))[side]
@@ -64,7 +67,7 @@ class DrawnBody:
 
     @property
     def ratios(self) -> dict[str, float]:
-        """Return name -> value of the given ratios."""
+        """Return name -> value of the ratios that this entry sets."""
         names = [item.name for item in fields(self) if item.name != "weight"]
         return {name: value for name in names if (value := getattr(self, name)) is not None}
 
@@ -80,10 +83,11 @@ def drawn_feet_setting(value: Any) -> tuple[DrawnFoot, ...] | None:
     """
 
     def checked(name: str, entry: DrawnFoot) -> DrawnFoot:
+        """Return the entry with its foot in checked JSON values, ranges included."""
         check_choice(f"{name}: on", entry.on, get_args(On))
         _check_ranges(name, entry.foot)
         low, high = (foot_setting(name, _end_of(entry.foot, end)).plain for end in (0, 1))
-        return replace(entry, foot=_joined(low, high))
+        return replace(entry, foot=_join_ends(low, high))
 
     return _entries("drawn_feet", value, DrawnFoot, checked)
 
@@ -95,6 +99,7 @@ def drawn_bodies_setting(value: Any, body: Body) -> tuple[DrawnBody, ...] | None
     """
 
     def checked(name: str, entry: DrawnBody) -> DrawnBody:
+        """Return the entry with floats for its ratios, with which the settings' body is possible."""
         try:
             replace(body, **entry.ratios)
         except SpringfootError as error:
@@ -112,14 +117,17 @@ def draw_index(entries: Sequence[DrawnFoot] | Sequence[DrawnBody], random: np.ra
 
 
 def draw_feet(entries: Sequence[DrawnFoot], random: np.random.Generator) -> FootPair:
-    """Draw one of the entries, then its side and numbers; return the feet."""
+    """Return a pair of feet from one of the entries, drawn by their weights: its `DrawnFoot.draw`."""
     return entries[draw_index(entries, random)].draw(random)
 
 
 def _entries(
     name: str, value: Any, kind: type[Entry], checked: Callable[[str, Entry], Entry]
 ) -> tuple[Entry, ...] | None:
-    """Return the entries of the setting `name`: each made a `kind`, its weight and then itself `checked`."""
+    """Return the entries of the setting `name`, each a `kind` that `checked`, called with its label, has returned.
+
+    None for None. Raises `SpringfootError`, which names the entry, for a `value` of another form or a bad weight.
+    """
     if value is None:
         return None
     keys = [item.name for item in fields(kind)]
@@ -144,11 +152,11 @@ def _entries(
 
 
 def _is_range(key: str, value: Any) -> bool:
-    """Return True for a list in place of a number."""
+    """Return True if the entry `key` of a foot's dictionary is a range: a list in place of a number."""
     return isinstance(value, (list, tuple)) and key not in _NO_RANGES
 
 
-def _on_log_scale(key: str) -> bool:
+def _is_on_log_scale(key: str) -> bool:
     """Return True for a number that is drawn evenly on the log scale: stiffness and damping."""
     return key.endswith("_stiffness") or key == "damping_time"
 
@@ -162,7 +170,7 @@ def _check_ranges(name: str, foot: Any) -> None:
             _check_ranges(f"{name}: {key}", value)
         elif _is_range(str(key), value):
             low, high = map(as_float, value) if len(value) == 2 else (np.nan, np.nan)
-            least = "0 < " if _on_log_scale(str(key)) else ""
+            least = "0 < " if _is_on_log_scale(str(key)) else ""
             if not low < high or (least and not low > 0.0):
                 raise SpringfootError(
                     f"{name}: {key} must be a number or [low, high] with {least}low < high, got {quoted(value)}"
@@ -175,7 +183,7 @@ def _end_of(foot: Any, end: int) -> Any:
 
 
 def _with_numbers(foot: Any, number: Callable[[str, float, float], float]) -> Any:
-    """Return a foot, or part of it, with `number` of name, low and high end in place of every range."""
+    """Return a foot, or part of it, with number(name, low end, high end) in place of every range."""
     if not isinstance(foot, Mapping):
         return foot
     plain = {}
@@ -187,15 +195,15 @@ def _with_numbers(foot: Any, number: Callable[[str, float, float], float]) -> An
     return plain
 
 
-def _joined(low: Any, high: Any) -> Any:
+def _join_ends(low: Any, high: Any) -> Any:
     """Return the foot with ranges from its checked low and high ends, of the same keys."""
     if isinstance(low, dict):
-        return {key: _joined(value, high[key]) for key, value in low.items()}
+        return {key: _join_ends(value, high[key]) for key, value in low.items()}
     return low if low == high else [low, high]
 
 
 def _draw_number(random: np.random.Generator, key: str, low: float, high: float) -> float:
     """Draw the number `key` of a foot from [low, high]: stiffness and damping on the log scale, all else evenly."""
-    if _on_log_scale(key):
+    if _is_on_log_scale(key):
         return min(max(exp(random.uniform(log(low), log(high))), low), high)  # `exp` may round beyond an end
     return random.uniform(low, high)

@@ -121,7 +121,7 @@ class FootSetting:
 
     @property
     def numbers(self) -> dict[str, Any]:
-        """Return the given numbers, lines, schedule and orthosis by name; all others have their defaults."""
+        """Return name -> value of the numbers, lines, schedule and orthosis that the setting gives."""
         given = {} if isinstance(self.plain, str) else self.plain
         return {name: value for name, value in given.items() if name != "kind"}
 
@@ -336,12 +336,12 @@ def foot_pairs(settings: Mapping[str, Any], num: int) -> tuple[dict[str, Any], l
 
 
 def _defaults(numbers: Mapping[str, Number]) -> dict[str, float | None]:
-    """Return the default of each number by its name."""
+    """Return name -> default value of each number; None for one that is left to the body."""
     return {name: number.usual for name, number in numbers.items()}
 
 
 def _springs(value: Mapping[str, Any]) -> tuple[Spring, Spring]:
-    """Return springs at ankle and toe from values by the names of `SPRING_NUMBERS`, `TABLES` and `ENGAGES`."""
+    """Return the springs at ankle and toe; `value` is name of `SPRING_NUMBERS`, `TABLES` or `ENGAGES` -> value."""
 
     def spring(joint: str) -> Spring:
         """Return the spring of one joint: by its torque-angle line if there is one, else by its numbers."""

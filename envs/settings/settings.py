@@ -399,14 +399,14 @@ def with_bodies_of_model(settings: BipedSettings) -> BipedSettings:
 
 
 def settings_of_bodies(settings: BipedSettings) -> tuple[BipedSettings, ...]:
-    """Return the settings with each of `drawn_bodies` as their body; they alone without any."""
+    """Return a copy of the settings for each of `drawn_bodies`, with it as the body; the settings alone without any."""
     if settings.drawn_bodies is None:
         return (settings,)
     return tuple(replace(settings, drawn_bodies=None, **drawn.ratios) for drawn in settings.drawn_bodies)
 
 
 def plan_file_of(settings: BipedSettings) -> Path | None:
-    """Return the file of the plan's style and leg constants; None for the package's."""
+    """Return the path of the setting `plan_file`, with the plan's style and leg constants; None for the package's."""
     return None if settings.plan_file is None else Path(settings.plan_file)
 
 

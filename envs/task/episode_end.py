@@ -35,7 +35,7 @@ TOO_LOW, TOO_TILTED = 1, 2
 def is_alive(m, min_hip_height) -> bool:
     """Return whether a body has neither fallen nor diverged.
 
-    `m` is the measurement of one body, `min_hip_height` [m] is `MIN_HIP_HEIGHT` scaled to it.
+    `m` is of `MEASURED`, `min_hip_height` [m] is `MIN_HIP_HEIGHT` scaled to it.
     """
     upright = m.base[1] >= min_hip_height and abs(m.base[2]) <= MAX_PITCH  # hip and trunk; False for NaN
     return upright and m.diverged < 0

@@ -23,7 +23,7 @@ START_DEPTH = 0.001
 
 
 def start_table(rows: Iterable[tuple[LegConstants, ReferenceWalk]]) -> PhaseTable:
-    """Return the target's posture over the stride as a table, for each row of `envs.control.reference_walk.rows`."""
+    """Return a table of the posture at a start over the stride, a row for each of `rows`, curves as `_start_curves`."""
     return PhaseTable(np.stack([_start_curves(walk) for _, walk in rows]))
 
 
@@ -65,9 +65,9 @@ def place(
     Locked joints start at their rest angle.
 
     Args:
-        simulation: the simulations.
-        subjects: their bodies.
-        ids: (K,) indices of those that start.
+        simulation: the N simulations.
+        subjects: their bodies and feet.
+        ids: (K,) indices of the simulations that start.
         posture: of `walking_posture` or `Standing.reset`.
         noise: (K, 2, side, joint) relative error of angles ([:, 0]) and rates ([:, 1]) [-].
     """

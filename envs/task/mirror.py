@@ -21,7 +21,7 @@ leg leads. Sine and cosine of twice the phase stay."""
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Mirror:
-    """Mirror image of observations and actions, by their names."""
+    """Mirror image of an observation of D entries and of A actions, by their names."""
 
     index: NDArray
     """(D,) entry of the observation that becomes each entry of its image."""
@@ -30,7 +30,7 @@ class Mirror:
     action_index: NDArray
     """(A,) action that becomes each action of the image."""
     legs_order: NDArray
-    """(A,) place of each action among those of the left leg, in their order, followed by their images of the right
+    """(A,) index of each action in a list of the left leg's actions followed by their images, those of the right
     leg."""
 
     def of(self, observation: NDArray) -> NDArray:
@@ -48,28 +48,28 @@ def mirror_of(observation_names: Sequence[str], action_names: Sequence[str]) -> 
 
     Raises `SpringfootError` for a name with a side whose other side is missing, and for an action without a side.
     """
-    action_index = _images(action_names)
+    action_index = _image_indices(action_names)
     for action, name in enumerate(action_names):
         if action_index[action] == action:
             raise SpringfootError(f"action {name} is of neither leg: its name must end in _{' or _'.join(SIDES)}")
     left = [action for action, name in enumerate(action_names) if name.endswith(f"_{SIDES[0]}")]
     by_legs = np.concatenate([left, action_index[left]])  # actions of the left leg, then of the right one
     return Mirror(
-        index=_images(observation_names),
+        index=_image_indices(observation_names),
         sign=np.array([-1 if name in OPPOSITE else 1 for name in observation_names], np.int8),
         action_index=action_index,
         legs_order=np.argsort(by_legs),
     )
 
 
-def _images(names: Sequence[str]) -> NDArray:
+def _image_indices(names: Sequence[str]) -> NDArray:
     """Return (n,) the index of each name's mirror image: the other side's name, or itself without a side."""
-    place = {name: index for index, name in enumerate(names)}
+    index_of = {name: index for index, name in enumerate(names)}
     images = []
     for name in names:
         stem, _, side = name.rpartition("_")
         image = f"{stem}_{SIDES[1 - SIDES.index(side)]}" if side in SIDES else name
-        if image not in place:
+        if image not in index_of:
             raise SpringfootError(f"{name} has no mirror image: there is no {image}")
-        images.append(place[image])
+        images.append(index_of[image])
     return np.array(images, int)

@@ -1,4 +1,8 @@
-"""Make the observation of a policy: dimensionless and bounded entries."""
+"""Make the observation of a policy: dimensionless and bounded entries.
+
+Axes: N environments; D entries; a `PhaseTable` (R, SAMPLES, 2, C) has R rows, phases, value and rise to the
+next phase, and C curves.
+"""
 
 from collections.abc import Sequence
 from functools import lru_cache
@@ -50,17 +54,17 @@ _SOFTEST = exp(-6.0)
 
 @lru_cache(maxsize=256)
 def units_of(body: Body) -> NDArray:
-    """Return the size of each of `UNITS` for a body, (6,) [SI]."""
+    """Return the size of each of `UNITS` for a body, (6,) [SI]; cached: do not change the result."""
     leg = body.leg_length
     return np.array([1.0, 1.0, leg, sqrt(GRAVITY * leg), sqrt(GRAVITY / leg), body.total_mass * GRAVITY])
 
 
 @part
 def _stiffness_entry(row, control, side, joint) -> float:
-    """Return the logarithm of K over its unit at one ankle or toe: of muscles and device together.
+    """Return the natural logarithm of K over its unit (`SCALES`) at one ankle or toe, muscles and device together [-].
 
     Before an episode's first step no K of muscles is set, and the entry is 0 but for devices of constant K. `row` is
-    of `TASK_ROW`, `control` of `CONTROL_ROW`.
+    of `TASK_ROW`, `control` of `CONTROL_ROW`; `side` is 0 left, 1 right, `joint` 0 ankle, 1 toe.
     """
     springs = control.springs
     stiffness = muscle_stiffness(springs, side, joint) + springs.device[side, joint]
@@ -151,7 +155,7 @@ class SensorNoise:
                     self._noise[index] = self._scale * random.standard_normal(len(self._scale))
 
     def on(self, observation: NDArray) -> NDArray:
-        """Return the observation (N, D) with its noise, float32, within its bounds."""
+        """Return the observation (N, D), float32, plus the noise drawn last, clipped to its bounds."""
         if not self._on:
             return observation
         noisy = observation.astype(float)

@@ -70,7 +70,7 @@ def _entries() -> tuple[Entry, ...]:
     )
 
 
-def _further_entries() -> tuple[Entry, ...]:
+def _person_entries() -> tuple[Entry, ...]:
     """Return the entries that only a person observes, in order: last offsets, slope, stiffness, feet and body."""
     springs = [(side, joint) for side in SIDES for joint in ("ankle", "toe")]
     return (
@@ -89,7 +89,7 @@ def _further_entries() -> tuple[Entry, ...]:
 
 
 def _worn_entries(side: str) -> tuple[Entry, ...]:
-    """Return the entries of the foot of one side."""
+    """Return the entries of the foot on one side, left or right; `envs.task.worn` computes their values."""
     return (
         Entry(f"muscles_ankle_{side}", "1", 0.0, 1.0, "1 for muscles, 0 for a device in their place", False),
         Entry(f"muscles_toe_{side}", "1", 0.0, 1.0, "likewise", False),
@@ -109,7 +109,7 @@ def _worn_entries(side: str) -> tuple[Entry, ...]:
 
 OBSERVATION = _entries()
 """Every entry of the observation, in order. l is the leg length (hip to floor when standing); the weight is that of
-body and load. No entry tells the mass of the body, as mechanics scale with it (`envs.physics.model`)."""
-PERSON_OBSERVATION = OBSERVATION + _further_entries()
+body and load. No entry shows the mass of the body, as mechanics scale with it (`envs.physics.model`)."""
+PERSON_OBSERVATION = OBSERVATION + _person_entries()
 """Every entry of the observation where the action moves the person: `OBSERVATION`, and the entries of a person.
 Stiffness is over that unit at 1.70 m and 63 kg, scaled with mass x height."""

@@ -1,7 +1,8 @@
 """Compute the named reward terms, over N environments.
 
 Row i of every result depends on row i of the arguments alone, by the same operations for any N: a batch of N gives the
-same bits as N batches of one.
+same bits as N batches of one. Axes: N bodies; W control windows of a step; side, 0 left and 1 right; contact heel, ball
+and toe tip; a `PhaseTable` (R, SAMPLES, 2, C) has R rows, phases, value and rise to the next phase, and C curves.
 """
 
 from collections.abc import Iterable, Sequence
@@ -74,7 +75,8 @@ TASK_OPTIONS = np.dtype(
 def _near_zmp(scale, control, targets, m, forces, i):
     """Return exp(-(d / tolerance)^2) of the distance d from the planned ZMP, forward, of the CoP; 0 in flight.
 
-    The CoP is that of both feet, mean over the step. Arguments are as of `judge`, of body `i`.
+    The CoP is that of both feet, mean over the step. Of body number `i`: `scale` is of `SCALES`, `control` of
+    `CONTROL_ROW`, `targets` (side,) of `TARGET`, `m` of `MEASURED`; `forces` are those of all bodies, as of `judge`.
     """
     load = moment = 0.0
     for window in range(len(forces)):
@@ -97,7 +99,7 @@ def _pose_error(scale, pitch, angle, target):
     """Return the weighted squared distance [rad^2] between the joint angles of a leg and the target's pose.
 
     `angle` (4,) [rad] begins with the hip, `target.pose` with the thigh to the vertical: the hip less the trunk's
-    `pitch` [rad].
+    `pitch` [rad]. `scale` is of `SCALES`, `target` of `TARGET`.
     """
     error = 0.0
     for joint in range(4):
@@ -112,6 +114,7 @@ def _force_distance(scale, forces, i, side, target):
     `EXCESS_SHARE` of the mean vertical force beyond `MAX_FORCE` [body weights].
 
     `forces` (W, N, side, contact, 2) [N], forward and up, are those of the step's windows; the body is number `i`.
+    `scale` is of `SCALES`, `target` of `TARGET`.
     """
     count = len(forces)
     forward = up = excess = 0.0
@@ -128,7 +131,10 @@ def _force_distance(scale, forces, i, side, target):
 
 @part
 def _impact(row, forces, i, seconds):
-    """Return the term `impact` of body `i`; 0 in an episode's first step.
+    """Return the term `impact` of body `i` [-]: the squared change of each foot's mean force since the last step.
+
+    The sum over feet, forward and up, of (change [body weights] x `ACTIVATION_TIME` / `seconds`)^2; 0 in an episode's
+    first step.
 
     `row` is of `TASK_ROW`, `forces` (W, N, side, contact, 2) [N] in the step's windows, `seconds` the time of the step.
     """
@@ -148,13 +154,20 @@ def _impact(row, forces, i, seconds):
 
 @part
 def _mean_speed(row, m, seconds):
-    """Return the mean of the CoM's forward speed [m/s] with one more step of `seconds`; `row` is of `TASK_ROW`."""
+    """Return the CoM's forward speed [m/s] after a low-pass of time constant `HELD_SECONDS`, with one step more.
+
+    `row`, of `TASK_ROW`, has its value before the step of `seconds`; `m` is of `MEASURED`.
+    """
     return row.mean_speed + seconds / HELD_SECONDS * (m.com_velocity[0] - row.mean_speed)
 
 
 @part
 def _acceleration(row, m, seconds):
-    """Return the term `acceleration` of one body in a step of `seconds`; `row` is of `TASK_ROW`."""
+    """Return the term `acceleration` of one body: the sum over joints of (mean acceleration x `ACTIVATION_TIME`^2)^2.
+
+    The mean is over a step of `seconds`, from the joint velocities before it, in `row`, of `TASK_ROW`, and after it, in
+    `m`, of `MEASURED`.
+    """
     total = 0.0
     for side in range(2):
         for joint in range(4):
@@ -165,7 +178,7 @@ def _acceleration(row, m, seconds):
 
 @part
 def remember(rows, bodies, options, running) -> None:
-    """Keep mean speed and joint velocities of the bodies `running` (N,) for the next step; arguments as of `judge`."""
+    """Write mean speed and joint velocities of the bodies `running` (N,) into `rows`, for the next step's reward."""
     for i in range(len(rows)):
         if running[i]:
             m = bodies[i].measured
@@ -177,13 +190,14 @@ _charged_calf_stiffness = part(charged_calf_stiffness)
 
 
 @part
-def _charged_stiffness(scale, controls, body, tendon, side, joint):
-    """Return the K at one joint that the term `stiffness` charges [N m/rad].
+def _charged_stiffness(scale, control, body, tendon, side, joint):
+    """Return the K at one ankle or toe that the term `stiffness` charges [N m/rad].
 
-    All of what the action sets; of a calf with a `tendon` [N m/rad], 0 for none, `charged_calf_stiffness`.
+    It is the whole K of muscles or of an adaptive device; with a `tendon` [N m/rad], 0 for none, at a calf's ankle only
+    the part of `charged_calf_stiffness`. `scale` is of `SCALES`, `control` of `CONTROL_ROW`, `body` of `BODY_ROW`.
     """
-    stiffness = muscle_stiffness(controls.springs, side, joint)
-    if joint > 0 or tendon == 0.0 or stiffness == 0.0 or controls.feet.rests[side, joint]:
+    stiffness = muscle_stiffness(control.springs, side, joint)
+    if joint > 0 or tendon == 0.0 or stiffness == 0.0 or control.feet.rests[side, joint]:
         return stiffness
     angle = body.measured.angle[side]
     unit = scale.strength_scale
@@ -205,7 +219,7 @@ def judge(rows, controls, bodies, table, options, forces, terms) -> None:
     [(K_ankle/300)^2 + (K_toe/60)^2/4]/1.25, K of muscles and of an adaptive device (other devices and slack
     muscles cost nothing; with a tendon see `charged_calf_stiffness`), scaled to 1.70 m and 63 kg; `effort`, positive
     work of hips, knees, ankles and toes in the step over body weight times commanded way: its cost of transport. The
-    price of the muscles (`springfoot.gait.plan.effort`), one control window late: `fibre_work`, metabolic energy of
+    cost of the muscles (`springfoot.gait.plan.effort`), one control window late: `fibre_work`, metabolic energy of
     their fibres over body weight times commanded way; `activation`, mean over the step of the squared activation by
     volume, all joints together. `impact`, sum over feet and directions of the squared change of the force since the
     last step [body weights] x `ACTIVATION_TIME` over the time of a step. `speed_held`, distance of the CoM's mean speed
@@ -287,7 +301,7 @@ class Task:
         settings: the weights of the reward, and the time of a step.
         rows: leg constants and walk of each row of the tables (`envs.control.reference_walk.rows`).
         subjects: bodies and commanded speeds.
-        feet: N pairs, the present feet of each body.
+        feet: N pairs, the feet that each body has now; the simulation changes the list.
     """
 
     def __init__(
@@ -303,7 +317,7 @@ class Task:
         self.high = HIGH[: len(entries)]
         self.weights = DEFAULT_WEIGHTS | settings.reward_weights
         self.rows = np.zeros(len(subjects.bodies), TASK_ROW)
-        """(N,) all that the task keeps of each environment."""
+        """(N,) of `TASK_ROW`: all numbers that the task remembers of each environment."""
         weights = [self.weights[name] for name in TERMS]
         seconds = settings.step_seconds
         share = seconds / ACTION_STEP
@@ -319,7 +333,7 @@ class Task:
         self.fit(range(len(self.rows)))
 
     def fit(self, ids: Iterable[int]) -> None:
-        """Take over the present bodies and feet of the subjects `ids`."""
+        """Compute scales, units and entries of the feet anew for the present bodies and feet of environments `ids`."""
         for index in ids:
             body = self._subjects.bodies[index]
             self.rows["scales"][index] = body_scales(body)[0]

@@ -42,7 +42,7 @@ SCALES = np.dtype(
 
 @lru_cache(maxsize=256)
 def body_scales(body: Body) -> NDArray:
-    """Return the limits, tolerances and units by which the reward judges a body, (1,) of dtype `SCALES`."""
+    """Return the limits, tolerances and units by which the reward judges a body, (1,) of `SCALES`; cached."""
     length = body.length_scale
     scales = np.zeros(1, SCALES)
     scales["min_hip_height"] = MIN_HIP_HEIGHT * length

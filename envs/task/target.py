@@ -1,7 +1,9 @@
 """Tabulate the target of the body at each phase of the stride, and measure the body's distance from it.
 
 With the guide `people` joint angles and forces are people's, and the CoM is the plan's; with the guide `plan` the whole
-target is the plan's.
+target is the plan's. Axes: N bodies; side, 0 left and 1 right; a `PhaseTable` (R, SAMPLES, 2, C) has R rows, one for
+each body, variant of the leg constants and tabulated speed, SAMPLES phases, value and rise to the next phase, and C
+curves.
 """
 
 import numpy as np
@@ -60,9 +62,8 @@ def targets_at(table, control, curves) -> NDArray:
     """Return the target at the present phases of both legs, (side,) of `TARGET`.
 
     Args:
-        table: (R, SAMPLES, 2, C) of a `PhaseTable`: R variants and speeds of the walk, C curves, the numbers of
-            `TARGET`.
-        control: one of `CONTROL_ROW`.
+        table: (R, SAMPLES, 2, C) of a `PhaseTable`, whose C curves are the numbers of `TARGET`.
+        control: one of `CONTROL_ROW`, with the phases of the legs.
         curves: (side, C) memory, which is filled; the target is a view of it.
     """
     for side in range(2):
@@ -74,7 +75,7 @@ def targets_at(table, control, curves) -> NDArray:
 def error_of(control, targets, m) -> tuple[float, float, float]:
     """Return CoM minus target of one body: x [m], z [m], forward speed [m/s].
 
-    `control` is of `CONTROL_ROW`, `targets` (side,) of `TARGET`, `m` the measurement. The x of the target is from the
+    `control` is of `CONTROL_ROW`, `targets` (side,) of `TARGET`, `m` of `MEASURED`. The x of the target is from the
     ankle of the leg whose stance began last; within the step it advances with the phase.
     """
     scale = control.subject.scale

@@ -15,7 +15,7 @@ WORN = 2 * OF_FOOT + 3
 
 
 def worn_entries(body: Body, feet: Feet) -> NDArray:
-    """Return (WORN,) entries of the observation: those of the left foot, of the right foot, and the body's ratios."""
+    """Return the values of the (WORN,) entries of a person's observation: left foot, right foot, the body's ratios."""
     of_feet = [_foot_entries(body, foot) for foot in feet]
     return np.array([*of_feet[0], *of_feet[1], body.leg_ratio, body.foot_ratio, body.carried_ratio])
 
@@ -23,14 +23,14 @@ def worn_entries(body: Body, feet: Feet) -> NDArray:
 def _foot_entries(body: Body, foot: Foot) -> tuple[float, ...]:
     """Return the `OF_FOOT` entries of one foot in their order; a device has no strength of muscles and is never slack.
 
-    A brace of stiffness 0 is told as none.
+    A brace of stiffness 0 counts as none.
     """
     at_ankle = foot.ankle.orthosis
     braces = [joint.orthosis.stiffness if joint.orthosis else 0.0 for joint in foot.joints]
     units = ANKLE_STIFFNESS_UNIT * body.stiffness_scale, TOE_STIFFNESS_UNIT * body.stiffness_scale
     slack = at_ankle.slack if at_ankle and at_ankle.stiffness > 0.0 else (0.0, 0.0)
     rests = [joint.device.rest if joint.device else joint.rest or 0.0 for joint in foot.joints]
-    own, intact = (sum(leg_segments(body, either).mass[1:]) for either in (foot, INTACT))  # [1:]: below the knee
+    mass, intact_mass = (sum(leg_segments(body, either).mass[1:]) for either in (foot, INTACT))  # [1:]: below the knee
     return (
         *(float(joint.has_muscles) for joint in foot.joints),
         foot.ankle.strength,
@@ -38,5 +38,5 @@ def _foot_entries(body: Body, foot: Foot) -> tuple[float, ...]:
         *rests,
         *(brace / unit for brace, unit in zip(braces, units, strict=True)),
         *slack,
-        (own - intact) / body.mass,
+        (mass - intact_mass) / body.mass,
     )

@@ -259,7 +259,7 @@ class Body:
 
     @property
     def carried_inertia(self) -> float:
-        """A box, radius of gyration `CARRIED_GYRATION`."""
+        """Inertia of the load, a box with the radius of gyration `CARRIED_GYRATION`."""
         return self.carried_mass * (CARRIED_GYRATION * self.length_scale) ** 2
 
     @property

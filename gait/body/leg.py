@@ -126,8 +126,10 @@ def joint_positions(body: Body, turn: NDArray, hip: NDArray) -> dict[str, NDArra
 
 
 def motion_of(value: NDArray, rate: NDArray, acceleration: NDArray) -> LegMotion:
-    """Return a leg's motion from columns (..., 6), four turns [rad], hip x and z [m], and their two time
-    derivatives."""
+    """Return a leg's motion from arrays (..., 6) of values and of their first and second time derivatives.
+
+    Columns are the turns of thigh, shank, foot and toe [rad], then x and z of the hip [m].
+    """
     return LegMotion(
         turn=value[..., :4],
         rate=rate[..., :4],
@@ -222,7 +224,10 @@ def inverse_dynamics(body: Body, motion: LegMotion, load: FootLoad, slope: float
 
 
 def _require_shapes(holder: object, last: Mapping[str, int], leading: tuple[int, ...]) -> None:
-    """Raise `SpringfootError` unless each array named in `last` has the shape (*leading, last[name]) in `holder`."""
+    """Raise `SpringfootError` unless the arrays of the dataclass `holder` share their `leading` axes.
+
+    `last` is name -> length of that array's last axis.
+    """
     for name, size in last.items():
         shape = getattr(holder, name).shape
         if shape != (*leading, size):

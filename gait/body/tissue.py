@@ -84,16 +84,17 @@ def ankle_tissue_stiffness(knee: Any, ankle: Any) -> Any:
 def charged_calf_stiffness(
     stiffness: Any, tissue: Any, torque: Any, tendon: float, scale: float, per_torque: float = STIFFNESS_PER_TORQUE
 ) -> Any:
-    """Return the calf's own K beyond that of a relaxed calf and what its torque brings [N m/rad], at least 0.
+    """Return the stiffness of the calf muscle beyond that of a relaxed calf and that which its torque brings [N m/rad],
+    at least 0.
 
-    The calf is in series with its tendon, and both are beside passive tissue. Arguments are numbers, as in kernels, or
-    arrays.
+    The muscle is in series with its tendon, and both are beside passive tissue: K of the ankle less that of the tissue
+    is that of muscle and tendon. Arguments are numbers, as in kernels, or arrays.
 
     Args:
         stiffness, tissue: K of the whole ankle, and of its tissue [N m/rad].
         torque: of the calf [N m].
         tendon: stiffness of the tendon at 1.70 m and 63 kg [N m/rad].
-        scale: of stiffness, `Body.strength_scale`.
+        scale: factor on the stiffness of tendon and relaxed calf for this body, `Body.strength_scale` [-].
         per_torque: rise of the calf's stiffness with its torque [1/rad].
     """
     # Calf and tendon alone: K may be below the tissue's, and the angles have moved on since it was bounded.

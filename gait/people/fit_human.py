@@ -127,6 +127,7 @@ def _read(path: Path) -> list[dict[str, str]]:
 
 
 def _rows_of(rows: list[dict[str, str]], condition: str) -> list[dict[str, str]]:
+    """Return the rows of one condition, the people's walk at one speed."""
     return [row for row in rows if row["condition"] == condition]
 
 

@@ -167,7 +167,7 @@ class HumanGait:
 def _waves(phases: bytes, count: int) -> NDArray:
     """Return (N, `count`) exp(2 pi i k phase), k from 0, at the `phases` (N,) float64 in bytes; not to be changed.
 
-    Kept, as all curves of all bodies are evaluated at the same phases.
+    Cached, as all curves of all bodies are evaluated at the same phases.
     """
     return np.exp(np.frombuffer(phases)[:, None] * (2j * np.pi * np.arange(count)))
 
@@ -243,7 +243,7 @@ def human_gait(speed: float, height: float = REFERENCE_HEIGHT, people: str | Pat
 
 @cache
 def foot_habits(people: str | Path = PEOPLE_FILE) -> FootHabits:
-    """Return the phases and stiffnesses for the foot's springs in the file `people`."""
+    """Return the phases and stiffnesses for the foot's springs in the file `people`; cached."""
     foot = harmonics(people)["foot"]
     phases = {name: tuple(foot[name]) for name in ("plateaus", "ankle_quasi_stiffness", "toe_flat", "toe_off")}
     return FootHabits(**phases, toe_swing_deg=foot["toe_swing_deg"])
@@ -252,9 +252,9 @@ def foot_habits(people: str | Path = PEOPLE_FILE) -> FootHabits:
 def human_cop(stance_share: ArrayLike, people: str | Path = PEOPLE_FILE) -> NDArray:
     """Return the centre of pressure over stance, forward of the flat foot's ankle, as a fraction of the foot's length.
 
-    `stance_share` 0 is heel strike, 1 toe-off; outside, the ends are given. ONE subject (56.7 kg, natural cadence;
-    Winter 2009, appendix A), within 3 mm rms, the same at all speeds: shape and size, not a norm. The ends of that foot
-    were not measured: its length is taken as the travel of the centre of pressure, 0.258 m.
+    `stance_share` 0 is heel strike, 1 toe-off; outside, the value of the nearer end holds. ONE subject (56.7
+    kg, natural cadence; Winter 2009, appendix A), within 3 mm rms, the same at all speeds: shape and size, not a norm.
+    The ends of that foot were not measured: its length is taken as the travel of the centre of pressure, 0.258 m.
     """
     fraction = np.clip(np.asarray(stance_share, float), 0.0, 1.0)
     coefficients = np.array(harmonics(people)["cop"]["coefficients"])  # of the powers of the fraction, from 0
@@ -265,7 +265,8 @@ def human_cop(stance_share: ArrayLike, people: str | Path = PEOPLE_FILE) -> NDAr
 def harmonics(people: str | Path = PEOPLE_FILE) -> dict:
     """Read a file of people's data, with its series as arrays (conditions, coefficients), Fourier ones complex.
 
-    The names are those of `human_harmonics.json`. Raises `SpringfootError` for another file.
+    The names are those of `human_harmonics.json`. Cached: do not change the result. Raises `SpringfootError` for
+    another file.
     """
     try:
         table = json.loads(read_bytes(Path(people), MOST_JSON_BYTES))
@@ -302,7 +303,7 @@ def _series(name: str, rows: Any, conditions: int) -> NDArray:
     `rows` are a file's lists, one a condition; `conditions` is the number of conditions. Fourier coefficients are
     [real, imaginary] in the file and complex here.
     """
-    _require_numbers(name, list(_flat(rows)), (-LARGEST_COEFFICIENT, LARGEST_COEFFICIENT))
+    _require_numbers(name, list(_flat_entries(rows)), (-LARGEST_COEFFICIENT, LARGEST_COEFFICIENT))
     series = np.array(rows, float)
     shape = (conditions, STANCE_TERMS) if name in FORCES else (conditions, HARMONICS + 1, 2)
     if series.shape != shape:
@@ -310,10 +311,10 @@ def _series(name: str, rows: Any, conditions: int) -> NDArray:
     return series if name in FORCES else series[..., 0] + 1j * series[..., 1]
 
 
-def _flat(rows: Any) -> Iterator[Any]:
-    """Yield the entries of lists within lists."""
+def _flat_entries(rows: Any) -> Iterator[Any]:
+    """Yield the entries, in order, of a list and of the lists within it that are no lists themselves."""
     for row in rows:
-        yield from _flat(row) if isinstance(row, list) else (row,)
+        yield from _flat_entries(row) if isinstance(row, list) else (row,)
 
 
 def _require_habits(foot: Mapping[str, Any]) -> None:

@@ -17,10 +17,10 @@ from .own_data import ACCEPTED, OwnGait, gait_of_percents, gait_of_walk, one_con
 from .strides import LegStrides, MeasuredWalk, borne_mass, force_delay, strides_of_legs
 
 MASSES_APART = 1.1
-"""Largest factor between the given mass and the one that the forces bear that is not told; chosen."""
+"""Largest factor between the body mass of the caller and that which the forces bear that gets no note; chosen."""
 CLOCKS_APART = 0.06
-"""Least time between forces and motion that is told [s]; chosen. Right files have 0.03 s at most: people at 0.85 to
-1.9 m/s, and walks here on sound, weak, passive, rigid and dropping feet."""
+"""Largest time between forces and motion that gets no note [s]; chosen. Right files have 0.03 s at most: people
+at 0.85 to 1.9 m/s, and walks here on sound, weak, passive, rigid and dropping feet."""
 LONGEST_SKIP = 1e4
 """Longest start of a walk that may be left out [s]; chosen."""
 LONG_WALK = 10.0
@@ -43,14 +43,14 @@ class MeasuredPerson:
     legs: Mapping[str, LegStrides]
     """Side (left, right, or "" for curves without a side) -> strides; a mean curve counts as one stride."""
     mass: float | None
-    """Body mass [kg]; None if nothing tells it."""
+    """Body mass [kg]; None if neither the caller nor the forces give it."""
     mass_from: str
     """Where the mass comes from, in words."""
     notes: tuple[str, ...]
     """Sentences on guesses and omissions."""
 
     def toe_off(self, side: str) -> float | None:
-        """Return the mean phase of toe-off of a leg, 0..1; None if nothing tells it."""
+        """Return the mean phase of toe-off of a leg, 0..1; for mean curves that of the file, None if it has none."""
         begin, off, end = self.legs[side].times.T
         return float(np.mean((off - begin) / (end - begin))) if len(begin) else self.gait.toe_off
 
@@ -71,8 +71,9 @@ def read_person(
     `speed` [m/s] goes before that of the files. Of a walk over time the first `skip` seconds are left out; None leaves
     out `WARM_UP` of a walk that lasts `LONG_WALK`. The rest is as of `read_gait`.
 
-    Legs with too few strides for a spread have all of theirs. Raises `SpringfootError` as `read_gait` does, for forces
-    that bear nobody's mass, for a toe's moment larger than the ankle's, and for a `skip` that leaves nothing.
+    A leg with too few strides for a spread is kept, with all its strides. Raises `SpringfootError` as `read_gait` does,
+    for forces that bear a mass outside `MASS_RANGE`, for a toe's moment larger than the ankle's, and for a
+    `skip` that leaves nothing.
     """
     if mass is not None:
         require_within("mass", mass, MASS_RANGE, "kg")

@@ -66,7 +66,10 @@ class Trial:
 
 
 def csv_trial(table: Table) -> Trial:
-    """Return a walk over time: column `time_s`, curves as in `COLUMNS`, `_left` or `_right` behind for two legs."""
+    """Return the walk over time in a table with a column of `TIME_COLUMNS`, and curves in the columns of `FILE_CURVES`.
+
+    Columns of one of two legs end in `_left` or `_right`. Raises `SpringfootError` for a table without time or curves.
+    """
     time = next((name for name in TIME_COLUMNS if name in table.columns), None)
     if time is None:
         raise SpringfootError(

@@ -117,7 +117,7 @@ class OwnGait:
                 f"got {values!r:.80}"
             )
         gait = cls(**{**values, "mean": _arrays_of("mean", values["mean"]), "sd": _arrays_of("sd", values["sd"])})
-        return _check(gait)
+        return _checked_gait(gait)
 
 
 def read_gait(
@@ -220,7 +220,8 @@ def _require_side(side: str) -> None:
 def gait_of_percents(table: Table, side: str, trust_units: bool) -> OwnGait:
     """Return the gait in a table of one gait's mean curves over percent 0 to 100 of the stride.
 
-    Curves without a side come first; otherwise those of `side`, or the mean of both.
+    With `side` "both" a curve without a side counts, else the mean of left and right, or the only one of them. With
+    "left" or "right" that side's curve counts, else the one without a side.
     """
     _require_side(side)
     legs = percent_curves(table)
@@ -359,15 +360,13 @@ def _with_series(gait: OwnGait, mean: Series, sd: Series, trust_units: bool, mas
     if not trust_units:
         require_plausible(gait.name, mean, _people_at(gait.speed), sd, mass_given)
         _require_one_speed(gait)
-    gait = _check(gait)
-    return _check(replace(gait, mean=_arrays_of("mean", fit(mean)), sd=_arrays_of("sd", fit(sd))))
+    gait = _checked_gait(gait)
+    return _checked_gait(replace(gait, mean=_arrays_of("mean", fit(mean)), sd=_arrays_of("sd", fit(sd))))
 
 
-def _check(gait: OwnGait) -> OwnGait:
-    """Return `gait` itself.
-
-    Raises `SpringfootError` for parameters outside `ACCEPTED`, and for forces without a toe-off.
-    """
+def _checked_gait(gait: OwnGait) -> OwnGait:
+    """Return `gait`, unchanged; raise `SpringfootError` for parameters outside `ACCEPTED`, and for forces without a
+    toe-off."""
     for name, (low, high, unit) in ACCEPTED.items():
         if getattr(gait, name) is not None:
             require_within(f"{gait.name}: {name}", getattr(gait, name), (low, high), unit)

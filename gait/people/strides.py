@@ -89,7 +89,10 @@ class LegStrides:
     forces."""
 
     def counted(self, curve: str) -> NDArray:
-        """Return the strides (s, 101) of a curve that count."""
+        """Return `curve` over percent of the strides that count for it, (s, 101).
+
+        These are all strides for an angle, and those in `weighed` for a force, a moment or a power.
+        """
         return self.curves[curve] if curve in ANGLE_CURVES else self.curves[curve][self.weighed]
 
 
@@ -189,7 +192,9 @@ def strides_of_legs(walk: MeasuredWalk, side: str = "both", mass: float | None =
     """Cut each leg of a walk into strides; arguments and errors as of `cut_strides`."""
     mass = borne_mass(walk, side) if mass is None else mass
     legs = _legs_as_read(walk, side)
-    return {name: replace(leg, curves=_scaled(leg.curves, name, walk.unscaled, mass)) for name, leg in legs.items()}
+    return {
+        name: replace(leg, curves=_scaled_curves(leg.curves, name, walk.unscaled, mass)) for name, leg in legs.items()
+    }
 
 
 def require_side(name: str, legs: Collection[str], side: str) -> None:
@@ -205,13 +210,16 @@ def _legs_as_read(walk: MeasuredWalk, side: str) -> dict[str, LegStrides]:
 
     The threshold of contact is first of about the body weight, then of that which these strides bear.
     """
-    legs = _legs_at(walk, side, None)
+    legs = _legs_by_weight(walk, side, None)
     weight = _borne_weight(legs.values())
-    return legs if weight is None else _legs_at(walk, side, weight)
+    return legs if weight is None else _legs_by_weight(walk, side, weight)
 
 
-def _legs_at(walk: MeasuredWalk, side: str, weight: float | None) -> dict[str, LegStrides]:
-    """Cut each leg of a walk into strides; `weight` is the body's, in the unit of the forces, None if unknown."""
+def _legs_by_weight(walk: MeasuredWalk, side: str, weight: float | None) -> dict[str, LegStrides]:
+    """Cut each leg of `side` (both, left, right) into strides, their curves in the units of the files.
+
+    `weight` is that of the body in the unit of the forces, for the threshold of contact; None: estimated from a force.
+    """
     require_side(walk.name, walk.legs, side)
     chosen = {name: leg for name, leg in walk.legs.items() if side in ("both", name)}
     strides = {name: _strides_of_leg(walk, name, weight) for name in chosen}
@@ -251,7 +259,7 @@ def borne_mass(walk: MeasuredWalk, side: str = "both") -> float | None:
 def _strides_of_leg(walk: MeasuredWalk, side: str, weight: float | None) -> NDArray:
     """Return (S, 3) heel strike, toe-off, next heel strike [s] of one leg, by the first method that finds enough.
 
-    Methods: the vertical force, the events in the file, the leg's motion. `weight` as of `_legs_at`.
+    Methods: the vertical force, the events in the file, the leg's motion. `weight` as of `_legs_by_weight`.
     """
     leg = walk.legs[side]
     candidates = (_contacts_of_force(walk, leg, weight), walk.contacts.get(side), _contacts_of_motion(walk, leg))
@@ -269,7 +277,7 @@ def _strides_of_leg(walk: MeasuredWalk, side: str, weight: float | None) -> NDAr
 
 
 def _contacts_of_force(walk: MeasuredWalk, leg: Series, weight: float | None) -> Contacts | None:
-    """Return the events of a leg by its vertical force; None without one. `weight` as of `_legs_at`."""
+    """Return the events of a leg by its vertical force; None without one. `weight` as of `_legs_by_weight`."""
     if "grf_vertical" not in leg:
         return None
     threshold = CONTACT_THRESHOLD_BW * (weight or _body_weight(leg["grf_vertical"]))
@@ -349,7 +357,7 @@ def _smooth(angle: NDArray, tick: float) -> NDArray:
 
 
 def _body_weight(force: NDArray) -> float:
-    """Return about the body weight, in the unit of a vertical `force`: 1 for a force that is never positive.
+    """Return an estimate of the body weight, in the unit of a vertical `force`: 1 for a force that is never positive.
 
     It is the median of the samples beyond half of the largest.
     """
@@ -357,16 +365,16 @@ def _body_weight(force: NDArray) -> float:
 
 
 def _on_plate(vertical: NDArray) -> NDArray:
-    """Tell of each stride (S,) whether its stance was on a force plate; `vertical` (S, 101) is the force."""
+    """Return (S,) True for strides whose stance was on a force plate; `vertical` (S, 101) is their vertical force."""
     low, high = WEIGHT_BEARING
     # A foot on a plate bears most of the body weight there; 0.3 of it is beyond what noise shows.
     return vertical[:, low : high + 1].min(axis=1, initial=np.inf) > 0.3 * _body_weight(vertical)
 
 
-def _scaled(curves: Series, side: str, unscaled: Collection[tuple[str, str]], mass: float | None) -> Series:
-    """Return curves with the `unscaled` ones divided: forces by body weight, moments and powers by `mass` [kg].
+def _scaled_curves(curves: Series, side: str, unscaled: Collection[tuple[str, str]], mass: float | None) -> Series:
+    """Return the curves of the leg `side`, forces in body weights, moments and powers per kg of `mass` [kg].
 
-    Without a mass these curves are left out.
+    `unscaled` has the (side, curve) that still have to be divided; without a mass these are left out.
     """
     scaled = {}
     for name, values in curves.items():

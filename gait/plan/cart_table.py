@@ -51,7 +51,7 @@ class HyperbolicPath:
     """(pieces,) coefficients of exp(rate (t - end)) [m]."""
 
     def __call__(self, time: ArrayLike, derivative: int = 0) -> NDArray:
-        """Return the position [m] at `time` [s] in the range of the ZMP, or a time derivative of the position."""
+        """Return the position [m] at `time` [s] on the ZMP's course, or its time derivative of order `derivative`."""
         time = np.asarray(time, float)
         knots = self.polynomial.x
         piece = np.clip(np.searchsorted(knots, time, "right") - 1, 0, len(knots) - 2)
@@ -74,8 +74,8 @@ class Bob:
     """Second harmonic over `amplitude`: cosine and sine of twice the turn since `lowest_at` [-]."""
 
     def __call__(self, time: ArrayLike, derivative: int = 0) -> NDArray:
-        """Return -amplitude (cos u + second[0] cos 2u + second[1] sin 2u), u = 2 pi (t - lowest_at) / T [m], or a time
-        derivative."""
+        """Return -amplitude (cos u + second[0] cos 2u + second[1] sin 2u), u = 2 pi (t - lowest_at) / T [m], or its
+        time derivative of order `derivative`; T is the step time."""
         turn = 2 * pi / self.step_time
         # Each derivative of a cosine is a quarter turn ahead.
         angle = turn * (np.asarray(time) - self.lowest_at)
@@ -275,10 +275,10 @@ def _path_by_matrices(
     slope: float,
     ahead: PPoly,
 ) -> PPoly:
-    """Return the path of `periodic_com` with a pivot `ahead` of the CoM, by Runge-Kutta steps of `STEP_SAMPLES` a step.
+    """Return the path of `periodic_com` with a pivot `ahead` of the CoM, by the method of Runge and Kutta.
 
-    The equation is linear, so each Runge-Kutta step is a matrix on (x, x', 1). The product of all matrices over a step
-    of the walk gives the periodic start.
+    The equation is linear, so each of about `STEP_SAMPLES` intervals in a step of the walk is a matrix on (x, x', 1).
+    The product of these matrices gives the periodic start.
     """
     step_time = zmp_times[-1]
     back, down = -gravity(slope)  # g sin a along and g cos a across a slope a

@@ -84,7 +84,7 @@ class ComPlan:
         return self.motion.zmp(self._time(step_phase))
 
     def _time(self, step_phase: ArrayLike) -> NDArray:
-        """Return the time [s] within a step."""
+        """Return the time since the step began [s] at step phases of any shape, which are taken modulo 1."""
         return np.mod(np.asarray(step_phase, float), 1.0) * self.step_time
 
 

@@ -1,6 +1,6 @@
 """Compute the effort of a walk: what it costs the muscles, from joint moments and angles alone.
 
-The same price holds for a plan, a step of the environment, a recording, a search and a study. The moment of a joint's
+The same rule holds for a plan, a step of the environment, a recording, a search and a study. The moment of a joint's
 muscle fibres is the muscles' moment less that of passive tissue. At ankle and toe the fibres pull through a tendon, a
 spring in series: what it stores they supply, what it returns is free. So the work of the fibres in a time dt is
 
@@ -8,8 +8,8 @@ spring in series: what it stores they supply, what it returns is free. So the wo
 
 with M the fibres' moment (extension positive), theta the joint's angle (flexion positive) and k the tendon's stiffness;
 the first part is what fibres and tendon deliver to the joint.
-Each joint is priced alone: fibres of one joint cannot use what those of another give. Effort uses no data of people's
-walks. Its terms are dimensionless, so the same prices suit every body and speed.
+The work of each joint counts alone: fibres of one joint cannot use what those of another give. Effort uses no data of
+people's walks. Its terms are dimensionless, so the same weights (`PRICES`) suit every body and speed.
 """
 
 from dataclasses import dataclass
@@ -54,7 +54,7 @@ PER_DEGREE = 0.1
 """Effort of a joint beyond its range, in a search [1/deg]; chosen."""
 
 
-# The price of a short interval --------------------------------------------------------------------------------
+# The work of a short interval ---------------------------------------------------------------------------------
 
 
 def interval_work(before: Any, moment: Any, after: Any, first: Any, second: Any, give: Any) -> Any:
@@ -92,7 +92,7 @@ def volume_weights() -> NDArray:
     return volume / volume.mean()
 
 
-# The price of a walk ------------------------------------------------------------------------------------------
+# The effort of a walk -----------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,7 +120,7 @@ class MuscleUse:
     activation: NDArray
     """(L, joint) integral over time of the squared activation, weighted by volume [s]."""
     rate: NDArray
-    """(L, joint) the same of `ACTIVATION_TIME` times the activation's rate [s]."""
+    """(L, joint) integral over time of the squared `ACTIVATION_TIME` x activation rate, weighted by volume [s]."""
 
     @property
     def energy(self) -> NDArray:
@@ -138,8 +138,8 @@ def muscle_use(
         delivered: (S, L, 4, 2) work of fibres and tendon on each joint in the two halves of the interval [J].
         tick: length of an interval [s].
         strength: (L, 4, 2) largest moments of each leg's muscles, extension and flexion [N m].
-        scale: of stiffness, `Body.strength_scale`.
-        muscle: factors on its properties.
+        scale: factor on the stiffness of the tendons for this body, `Body.strength_scale` [-].
+        muscle: factors on properties of the muscles.
     """
     # Intervals 1 to S - 2 have an interval before and one after: [:-2], [1:-1] and [2:] are before, they and after.
     give = np.array(TENDON_GIVE) * [1.0, 1.0, muscle.tendon, muscle.toe_tendon] / scale
@@ -175,25 +175,29 @@ class Effort:
 
     @property
     def total(self) -> float:
-        """Return the effort at `PRICES`."""
+        """Return the effort: the sum of `terms`, each times its weight in `PRICES` [-]."""
         return float(np.dot(PRICES, self.terms))
 
     @property
     def terms(self) -> tuple[float, float, float, float]:
-        """Return the terms that have a price: work, activation, its rate, acceleration."""
+        """Return the terms with a weight in `PRICES`, in its order: work, activation, rate and acceleration [-]."""
         return self.work, self.activation, self.rate, self.acceleration
 
 
 def mean_squared_acceleration(velocity: NDArray, tick: float) -> float:
-    """Return `Effort.acceleration` of S samples of the joint velocities of L legs, (S, L, 4) [rad/s], every `tick`
-    [s]."""
-    # Without the toe, the last joint.
+    """Return the term `Effort.acceleration` [-] of L legs, from joint velocities (S, L, 4) [rad/s].
+
+    The S samples are `tick` [s] apart, joints in the order of `JOINTS`; the toe, the last joint, does not count.
+    """
     change = np.diff(velocity[..., : JOINTS.index("toe")], axis=0) / tick
     return float(ACTIVATION_TIME**4 * (change**2).mean(0).sum())
 
 
 def beyond_range(angle: NDArray) -> float:
-    """Return `Effort.beyond_range` [deg] of S samples of a leg's joint angles, (S, 4) [rad]."""
+    """Return by how much the joints of a leg leave `MOTION_RANGE_DEG` [deg]: the sum of their largest excesses.
+
+    `angle` (S, 4) [rad] are S samples of the joints in the order of `JOINTS`.
+    """
     angle_deg = np.degrees(angle)
     beyond = 0.0
     for joint, (least, most) in MOTION_RANGE_DEG.items():
@@ -203,13 +207,13 @@ def beyond_range(angle: NDArray) -> float:
 
 
 def effort_of(plan: WalkPlan, muscle: Muscle = AS_IS) -> Effort:
-    """Compute the effort of a planned stride, with moments by inverse dynamics."""
+    """Compute the effort of a stride of a plan, both legs, with joint moments by inverse dynamics."""
     body = plan.body
     phase = np.arange(EFFORT_SAMPLES) / EFFORT_SAMPLES
     motion, load = planned_leg(plan, phase)
     dynamics = inverse_dynamics(body, motion, load, plan.slope)
     moment = np.stack([dynamics.moment[joint] for joint in JOINTS], -1)
-    angle, rate = (_of_joints(turns) for turns in (motion.turn, motion.rate))
+    angle, rate = (_segments_to_joints(turns) for turns in (motion.turn, motion.rate))
     return effort_of_stride(body, angle, rate, moment, plan.stride_time, 2 * plan.step_length, muscle)
 
 
@@ -263,7 +267,7 @@ def _with_neighbours(values: NDArray) -> NDArray:
     return np.concatenate([values[-1:], values, values[:1]])
 
 
-def _of_joints(turns: NDArray) -> NDArray:
+def _segments_to_joints(turns: NDArray) -> NDArray:
     """Return joint angles or rates (..., 4) of hip, knee, ankle, toe from those of segments (`LEG_SEGMENTS`).
 
     Flexion and dorsiflexion are positive; the hip's is the thigh to the vertical.

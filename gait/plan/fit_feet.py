@@ -46,7 +46,10 @@ class Case:
     """Joint of `JOINT_WEIGHTS` -> people's curve (POSTURE_SAMPLES,) [rad]."""
 
     def errors(self) -> NDArray:
-        """Return the weighted errors of the joints [deg] with the present constants, and the cost of the floor."""
+        """Return the residuals of the fit with the present constants of `foot_style`, one array [deg].
+
+        Joints' weighted differences from people's at hundredths of the stride, then the cost of a foot in the floor.
+        """
         path = feet_under_zmp(STANDARD, self.plan.step_length, self.zmp_times, self.zmp_points, self.plan.feet.roll)
         motion = self.plan.motion
         # Three rounds settle the CoM height at which the straightest knee has its least flexion.

@@ -229,14 +229,14 @@ def feet_under_zmp(
     """Plan feet with rockers that follow the ZMP, so that the ZMP stays within the feet's parts on the ground.
 
     Args:
-        body: whose feet they are.
-        step_length: [m].
+        body: lengths of foot and leg.
+        step_length: heel strike to heel strike of the other foot [m].
         zmp_times: corners of the ZMP's course over a step [s]: heel strike, the other foot's toe-off, perhaps more, the
             next heel strike.
         zmp_points: ZMP at these times [m from the stance ankle]; straight in between.
         roll: of the toe over its tip late in stance: 0 for none, 1 for people's.
         clearance: least height of the swing foot in mid-swing [m]; None: as the style gives it.
-        style: in place of people's.
+        style: pitches and shape of the path; None: people's (`peoples_style`).
 
     Raises `SpringfootError` for a ZMP off the feet, or a step shorter than the ZMP's travel.
     """

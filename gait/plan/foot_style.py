@@ -91,9 +91,9 @@ def peoples_style(step_ratio: float, roll: float, heel_rocker: float, tip_rocker
         roll_pitch=min(pitch_at(ROLL_PITCH, step_ratio, roll), QUICKEST_ROLL * tip_rocker),
         toe_rocker_power=float(between(TOE_ROCKER_POWER, roll)),
         roll_power=ROLL_POWER,
-        via_forward=_pair(VIA_FORWARD, roll),
-        via_up=_pair(VIA_UP, roll),
-        via_pitch=_pair(VIA_PITCH, roll),
+        via_forward=_two_between(VIA_FORWARD, roll),
+        via_up=_two_between(VIA_UP, roll),
+        via_pitch=_two_between(VIA_PITCH, roll),
     )
 
 
@@ -103,12 +103,14 @@ def between(pair: tuple, roll: float) -> NDArray:
 
 
 def pitch_at(pair: tuple, step_ratio: float, roll: float) -> float:
-    """Return a pitch at an event [rad], positive: a (step length / leg length)^n, of the `pair` of a, n for a roll of 0
-    and of 1."""
+    """Return a pitch at an event [rad], positive: a `step_ratio`^n, with the step length over the leg length.
+
+    `pair` has (a, n) for a `roll` of 0 and of 1; in between the pitch is linear in `roll`.
+    """
     return float(between(tuple(a * step_ratio**n for a, n in pair), roll))
 
 
-def _pair(pair: tuple, roll: float) -> tuple[float, float]:
-    """Return a constant of two numbers, as `between`."""
+def _two_between(pair: tuple, roll: float) -> tuple[float, float]:
+    """Interpolate a constant of two numbers between its values in `pair`, at a `roll` of 0 and of 1."""
     first, second = between(pair, roll)
     return float(first), float(second)

@@ -44,7 +44,7 @@ def spinning_legs(
         still: the pivot [m] over time [s] of legs that do not turn, with which the rounds begin.
         step_length: length of a step [m].
         knee: least flexion of the knee [rad]; it sets the mean CoM height if `height` does not.
-        height: mean CoM height [m], if it is given.
+        height: mean CoM height [m]; None: found, so that the straightest knee has the flexion `knee`.
         lean: forward lean of the trunk [rad].
 
     Raises `SpringfootError` if the rounds do not settle.

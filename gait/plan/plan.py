@@ -127,7 +127,7 @@ def plan_walk(
     """Plan a walk of `body` at `speed` [m/s] along the ground.
 
     Args:
-        body: to plan for.
+        body: lengths and masses.
         speed: mean forward speed [m/s].
         cadence: "people": step length and time as people of that height choose them at that speed (0.66 m, 0.55 s at
             1.2 m/s, 1.70 m); outside their data both change with the square root of speed. "thesis": 0.5 s a step at
@@ -145,7 +145,7 @@ def plan_walk(
         style: choices in place of those by people's curves (`walk_style`); the other arguments override the style.
 
     At 1.2 m/s, 1.70 m the angles lie within 3.4 (thigh), 4.3 (knee) and 6.0 deg rms (ankle) of people's, and the CoM is
-    accelerated by up to 0.26 g fore and aft: the price of a double support shorter than people's. With a double support
+    accelerated by up to 0.26 g fore and aft, as double support is shorter than people's. With a double support
     of 0.12 s the acceleration is 0.23 g, and the angles are 5.6, 7.0 and 9.3 deg off.
 
     Raises `SpringfootError`, saying by how much, for an impossible walk: legs too short, ZMP outside the feet, a swing
@@ -159,7 +159,7 @@ def plan_walk(
     slope = require_within("slope", slope, SLOPE_RANGE, "rad")
     human = human_gait(speed, body.height) if human is None else human
     if step_time is None:
-        step_time, step_length = _step(body, speed, cadence, human)
+        step_time, step_length = _step_time_and_length(body, speed, cadence, human)
     else:
         step_time = require_within("step_time", step_time, STEP_TIME_RANGE, "s")
         step_length = speed * step_time
@@ -234,7 +234,7 @@ def plan_walk(
     return plan
 
 
-def _step(body: Body, speed: float, cadence: str, human: HumanGait) -> tuple[float, float]:
+def _step_time_and_length(body: Body, speed: float, cadence: str, human: HumanGait) -> tuple[float, float]:
     """Return step time [s] and step length [m] of a cadence ("people" or "thesis") at `speed` [m/s].
 
     `human` gives those of people at the nearest speed of their data.
@@ -296,5 +296,5 @@ def _periodic_table(values: NDArray, shift: NDArray | float = 0.0) -> PchipInter
 
 
 def _by_angle(columns: NDArray) -> dict[str, NDArray]:
-    """Return the columns (..., 4) by the names of `ANGLES`."""
+    """Return name -> angle (...) [rad] from columns (..., 4): thigh, knee, ankle and toe, the names of `ANGLES`."""
     return dict(zip(ANGLES, np.moveaxis(columns, -1, 0), strict=True))

@@ -73,8 +73,9 @@ def legs_under_com(
 ) -> LegPostures:
     """Find one leg's postures over the stride that put the whole-body CoM on the planned CoM.
 
-    The trunk is upright, or leans under a load. The search starts at the postures `near`, if given. `lean` [rad]: see
-    `ComPlan`. Positions are in the frame of the ground; trunk and thigh angles are to the true vertical, on slopes too.
+    The trunk is upright, or leans under a load, and by `lean` [rad] forward besides. The search starts at the postures
+    `near`; None: at a hip a tenth of the leg's length below the CoM. Positions are in the frame of the ground; trunk
+    and thigh angles are to the true vertical, on slopes too.
     """
     phase = np.arange(POSTURE_SAMPLES) / POSTURE_SAMPLES
     x, z = motion.position(np.mod(2 * phase, 1.0) * motion.step_time)

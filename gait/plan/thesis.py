@@ -181,7 +181,7 @@ class ThesisWalk:
 
     def normalised_time(self, time: ArrayLike) -> NDArray:
         """Return t_nor_cyc, the figures' time axis. Fault: 1 is 0.75 s at k = 1, a step and a half, not a stride."""
-        return (self._within(time) - self.step_time) / (self.k * self.step_time + self.highest_ankle_time)
+        return (self._checked_time(time) - self.step_time) / (self.k * self.step_time + self.highest_ankle_time)
 
     def com_height(self, time: ArrayLike, derivative: int = 0) -> NDArray:
         """Return Z = 0.89 - 0.012 sin(4 pi (t - 2.62)) [m] or its rate. Fault: highest as double support begins."""
@@ -192,7 +192,7 @@ class ThesisWalk:
 
     def com(self, time: ArrayLike) -> tuple[NDArray, NDArray]:
         """Return Figure 6: CoM (x, z) [m]; passes its knots but for the least-squares cubic (by up to 46 mm)."""
-        time = self._within(time)
+        time = self._checked_time(time)
         return self._com_forward.position(time), self.com_height(time)
 
     def com_acceleration(self, time: ArrayLike) -> tuple[NDArray, NDArray]:
@@ -200,17 +200,17 @@ class ThesisWalk:
 
         Fault: the thesis calls the vertical one too small to matter in 2.2, and uses it in the appendix.
         """
-        time = self._within(time)
+        time = self._checked_time(time)
         return self._com_forward.acceleration(time), self.com_height(time, 2)
 
     def ankle(self, time: ArrayLike) -> tuple[NDArray, NDArray]:
         """Return Figure 7: ankle (x, z) [m], a not-a-knot cubic spline. Fault: sinks by 6 mm in stance."""
-        x, z = np.moveaxis(self._splines["ankle"](self._within(time)), -1, 0)
+        x, z = np.moveaxis(self._splines["ankle"](self._checked_time(time)), -1, 0)
         return x, z
 
     def toe_joint(self, time: ArrayLike) -> tuple[NDArray, NDArray]:
         """Return Figure 8: toe joint (x, z) [m], splined likewise. Fault: 23 mm in the floor in stance."""
-        x, z = np.moveaxis(self._splines["toe"](self._within(time)), -1, 0)
+        x, z = np.moveaxis(self._splines["toe"](self._checked_time(time)), -1, 0)
         return x, z
 
     def ground_reaction(self, time: ArrayLike) -> tuple[NDArray, NDArray]:
@@ -256,7 +256,7 @@ class ThesisWalk:
 
     def support(self, time: ArrayLike) -> tuple[NDArray, NDArray]:
         """Rear and front end (x, x) [m] of the hull of the feet on the ground, each whole from heel to toe tip."""
-        time = self._within(time)
+        time = self._checked_time(time)
         heel_strike = (self.k + 1) * self.step_time
         trailing = time < heel_strike
         since = time - np.where(trailing, self.k * self.step_time, heel_strike)
@@ -281,7 +281,7 @@ class ThesisWalk:
 
     @cached_property
     def _com_forward(self) -> _Course:
-        """The CoM's forward course, by `interpolation`."""
+        """Forward position and acceleration of the CoM over time, through its knots by `interpolation`; cached."""
         t = self.knot_times
         x, _ = self.com_knots
         if self.interpolation == "not-a-knot":
@@ -305,11 +305,11 @@ class ThesisWalk:
 
     @cached_property
     def _splines(self) -> dict[str, CubicSpline]:
-        """Paths (x, z) [m] of ankle and toe joint over time [s]."""
+        """Joint (ankle, toe) -> not-a-knot spline of its path (x, z) [m] over time [s]; cached."""
         knots = {"ankle": self.ankle_knots, "toe": self.toe_joint_knots}
         return {joint: CubicSpline(self.knot_times, np.stack(xz, -1)) for joint, xz in knots.items()}
 
-    def _within(self, time: ArrayLike) -> NDArray:
+    def _checked_time(self, time: ArrayLike) -> NDArray:
         """Return the times as an array; raise `SpringfootError` for times outside the knots, a step and a half."""
         time = np.asarray(time, float)
         ends = self.knot_times[[0, -1]]

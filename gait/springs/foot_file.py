@@ -25,7 +25,7 @@ def read_foot(path: str | Path) -> dict[str, Any]:
     """
     path = Path(path)
     if path.suffix.lower() == ".csv":
-        return {"kind": "passive"} | _tables(path)
+        return {"kind": "passive"} | _torque_tables(path)
     foot = read_object(path, "foot (a JSON object, or a table in a file .csv)")
     if "kind" in foot:
         return foot
@@ -44,8 +44,11 @@ def read_foot(path: str | Path) -> dict[str, Any]:
     return {"kind": "adaptive", "schedule": springs.to_json()}
 
 
-def _tables(path: Path) -> dict[str, list[list[float]]]:
-    """Return the settings `ankle_table` and `toe_table` of a CSV file: pairs of angle [deg] and torque [N m]."""
+def _torque_tables(path: Path) -> dict[str, list[list[float]]]:
+    """Return `ankle_table` or `toe_table` -> pairs of angle [deg] and torque [N m], from a CSV file.
+
+    A joint without columns is left out; raises `SpringfootError` for a file without any.
+    """
     table = read_csv(path)
     tables = {}
     for joint in SPRINGS:

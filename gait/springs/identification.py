@@ -9,7 +9,7 @@ spread (`PhaseSpring.angle_spread`).
 
 Its limit: no data of an undisturbed gait tell a theta_eq that stands still from one that moves with the angle. The
 result is the slope of the loop of torque over angle (quasi-stiffness), and the spring's K only if theta_eq stood still
-in the phase. On the simulation's fixed schedule, whose theta_eq moves, it gives 162 N m/rad for an applied 424 at 30-44
+in the phase. On the simulation's own schedule, whose theta_eq moves, it gives 162 N m/rad for an applied 424 at 30-44
 % of the stride, and 137 for 296 at 50-62 % (`springfoot study identify schedule`); interval and warning do not show it.
 If a gait can be pushed, `identification_by_pushes` finds K itself.
 """
@@ -92,10 +92,13 @@ def identify(
     Returns:
         P results, in the order of `bounds`. Raises `SpringfootError` for bad arrays or bounds.
     """
-    return tuple(_spring(edges, *curves) for edges, curves in _windows(torque, angle, velocity, phase, bounds, margin))
+    return tuple(
+        _phase_spring(edges, *curves)
+        for edges, curves in _samples_by_phase(torque, angle, velocity, phase, bounds, margin)
+    )
 
 
-def _spring(edges: tuple[float, float], torque: NDArray, angle: NDArray, velocity: NDArray) -> PhaseSpring:
+def _phase_spring(edges: tuple[float, float], torque: NDArray, angle: NDArray, velocity: NDArray) -> PhaseSpring:
     """Identify the spring of one phase, from its bounds and its samples (n,), and collect reasons to doubt it."""
     count = len(torque)
     estimates: Sequence[Estimate | None] = [None] * len(PARAMETERS)
@@ -161,12 +164,12 @@ def _spring(edges: tuple[float, float], torque: NDArray, angle: NDArray, velocit
     )
 
 
-def _windows(
+def _samples_by_phase(
     torque: ArrayLike, angle: ArrayLike, velocity: ArrayLike, phase: ArrayLike, bounds: Sequence[float], margin: float
 ) -> list[tuple[tuple[float, float], tuple[NDArray, NDArray, NDArray]]]:
-    """Check the arguments of `identify`, and cut the samples into phases.
+    """Return the samples of each phase: its two bounds, and torque, angle and velocity (n,) in it without the margin.
 
-    Returns for each phase its bounds, and torque, angle and velocity (n,) of the samples in it.
+    Arguments are as of `identify`; raises `SpringfootError` for bad ones.
     """
     arrays = [np.asarray(values, float) for values in (torque, angle, velocity, phase)]
     shapes = [values.shape for values in arrays]

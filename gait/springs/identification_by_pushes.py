@@ -167,9 +167,10 @@ def _samples(
 
 
 def _phase_spring(data: _Data, low: float, high: float, margin: float, spacing: float | None) -> PushedSpring:
-    """Identify the spring of the phase from `low` to `high` [stride], and tell whether it is one.
+    """Identify the spring of the phase from `low` to `high` [stride], with the verdict whether it is a spring.
 
-    `margin` and `spacing` as of `identify_pushed`.
+    K and beta are None if trials are too few or the motion is too small. `margin` and `spacing` are as of
+    `identify_pushed`.
     """
     # Samples of the phase, by bins of equal phase; bins with few samples are left out.
     first = low + margin
@@ -213,16 +214,16 @@ def _phase_spring(data: _Data, low: float, high: float, margin: float, spacing: 
         return _unknown_spring(common, "angle and velocity move too little, or as one, to tell K from beta")
     # K and K beta as means over the samples, by all trials and without each trial; beta = (K beta) / K.
     mean_weights = knot_weights.mean(0)
-    columns = len(mean_weights)
-    stiffness = fit.coefficients[:columns] @ mean_weights
-    stiffness_without = fit.without[:, :columns] @ mean_weights
-    k_beta = fit.coefficients[columns:] @ mean_weights
-    k_beta_without = fit.without[:, columns:] @ mean_weights
+    knots = len(mean_weights)
+    stiffness = fit.coefficients[:knots] @ mean_weights
+    stiffness_without = fit.without[:, :knots] @ mean_weights
+    k_beta = fit.coefficients[knots:] @ mean_weights
+    k_beta_without = fit.without[:, knots:] @ mean_weights
     K = fit.interval(stiffness, stiffness_without)
     bounded = K.low > 0 or K.high < 0
     # The part that further states explain beyond the spring, and its p-value.
     reaction = max(fit_with_states.explained - fit.explained, 0.0)
-    chance = fit_with_states.chance(2 * columns)
+    chance = fit_with_states.chance(2 * knots)
     verdict, reason = _verdict(K, fit.explained, reaction, chance)
     return PushedSpring(
         **common,

@@ -74,8 +74,8 @@ def fit_spring(torque: NDArray, angle: NDArray, velocity: NDArray) -> SpringFit:
 def intervals(fit: SpringFit) -> list[tuple[NDArray, NDArray, NDArray]]:
     """Return (value, low, high) of K, of beta = c / K and of theta_eq = a / K, each (...).
 
-    Intervals of ratios are Fieller's (1954), exact: all r for which numerator - r K does not differ from 0. If K may be
-    0 a ratio has no bounds.
+    a, K and c are the coefficients of the fit, tau = a - K theta - c theta'. Intervals of ratios are Fieller's (1954),
+    exact: all r for which numerator - r K does not differ from 0. If K may be 0 a ratio has no bounds.
     """
     quantile = stdtrit(fit.freedom, (1 + CONFIDENCE) / 2)  # Student's t
     # v are covariances of a, K, c times the squared quantile: squared half widths.

@@ -55,7 +55,7 @@ class StiffnessSchedule:
 
     def __post_init__(self) -> None:
         for joint in SPRINGS:
-            segments = tuple(_segment(joint, entry) for entry in getattr(self, joint))
+            segments = tuple(_checked_segment(joint, entry) for entry in getattr(self, joint))
             starts = [segment.start for segment in segments]
             if not segments or starts != sorted(set(starts)):
                 raise SpringfootError(f"{joint} segments must ascend in phase, at least one, got starts {starts}")
@@ -116,7 +116,7 @@ def ankle_events(phase: ArrayLike, angle: ArrayLike, toe_off: float) -> dict[str
     flat is the ankle's lowest angle before its largest in stance. An ankle that only dorsiflexes has foot flat at heel
     strike; one that only plantarflexes has its maximum there too. Raises `SpringfootError` for curves of another form.
     """
-    phase, angle = _stance(phase, angle, toe_off)
+    phase, angle = _stance_part(phase, angle, toe_off)
     top = int(angle.argmax())  # sample of maximum dorsiflexion
     dip = int(angle[: top + 1].argmin())
     return {
@@ -134,7 +134,7 @@ def toe_events(phase: ArrayLike, angle: ArrayLike, toe_off: float) -> dict[str, 
     stance, since a toe also lands raised. The toe rises to it from its lowest angle after a quarter of stance, when the
     foot is flat; heel-off is the last phase at which it has made at most `HEEL_OFF_RISE` of that rise.
     """
-    phase, angle = _stance(phase, angle, toe_off)
+    phase, angle = _stance_part(phase, angle, toe_off)
     quarter, half = np.searchsorted(phase, [toe_off / 4, toe_off / 2])
     top = int(half + angle[half:].argmax())
     flat = angle[quarter : top + 1]
@@ -172,11 +172,11 @@ def schedule_from_curves(
     of low stiffness: give a higher `lowest`).
     """
     low_ankle, low_toe = (require_within("lowest", k, STIFFNESS_RANGE, "N m/rad") for k in lowest)
-    ankle_lines = _lines(ankle_events(phase, ankle[0], toe_off), phase, *ankle, low_ankle)
+    ankle_lines = _springs_between_events(ankle_events(phase, ankle[0], toe_off), phase, *ankle, low_ankle)
     if toe is None:
         toe_lines = [Segment(0.0, toe_stiffness, 0.0)]
     else:
-        toe_lines = _lines(toe_events(phase, toe[0], toe_off), phase, *toe, low_toe)
+        toe_lines = _springs_between_events(toe_events(phase, toe[0], toe_off), phase, *toe, low_toe)
     return StiffnessSchedule(
         (*ankle_lines, Segment(toe_off, low_ankle, 0.0)), (*toe_lines, Segment(toe_off, low_toe, 0.0))
     )
@@ -229,20 +229,20 @@ def with_swing(
     return StiffnessSchedule(*segments)
 
 
-def _stance(phase: ArrayLike, angle: ArrayLike, toe_off: float) -> tuple[NDArray, NDArray]:
+def _stance_part(phase: ArrayLike, angle: ArrayLike, toe_off: float) -> tuple[NDArray, NDArray]:
     """Return phases and angles from heel strike to `toe_off`, with a sample at `toe_off` itself.
 
     Arguments as of `ankle_events`. Raises `SpringfootError` for curves of another form.
     """
     require_within("toe_off", toe_off, (0.0, 1.0))
-    phase, angle = _curves(phase, angle)
+    phase, angle = _checked_curves(phase, angle)
     if not (len(phase) > 1 and phase[0] == 0.0 and np.all(np.diff(phase) > 0) and 0 < toe_off <= phase[-1]):
         raise SpringfootError(f"phase must ascend from 0 to toe_off ({toe_off:g}) or beyond, got {phase!s:.60}")
     inside = phase < toe_off
     return np.append(phase[inside], toe_off), np.append(angle[inside], np.interp(toe_off, phase, angle))
 
 
-def _curves(*curves: ArrayLike) -> list[NDArray]:
+def _checked_curves(*curves: ArrayLike) -> list[NDArray]:
     """Return the curves as float arrays (n,); raise `SpringfootError` unless all are finite and of one length."""
     arrays = [np.asarray(curve, float) for curve in curves]
     shapes = [array.shape for array in arrays]
@@ -251,14 +251,15 @@ def _curves(*curves: ArrayLike) -> list[NDArray]:
     return arrays
 
 
-def _lines(
+def _springs_between_events(
     events: dict[str, float], phase: ArrayLike, angle: ArrayLike, torque: ArrayLike, lowest: float
 ) -> list[Segment]:
-    """Return the straight line's spring from each event to the next; no segment between events that coincide.
+    """Return one spring for each event but the last: that of the straight line to the next event (`line_spring`).
 
-    `events` are stride phases by name, ascending; angle [rad] and torque [N m] are curves (n,) over `phase` (n,).
+    Events that coincide have no spring between them. `events` are stride phases by name, ascending; angle [rad] and
+    torque [N m] are curves (n,) over `phase` (n,), `lowest` the least K [N m/rad].
     """
-    phases, angles, torques = _curves(phase, angle, torque)
+    phases, angles, torques = _checked_curves(phase, angle, torque)
     times = list(events.values())
     points = [(float(np.interp(time, phases, angles)), float(np.interp(time, phases, torques))) for time in times]
     return [
@@ -268,7 +269,7 @@ def _lines(
     ]
 
 
-def _segment(joint: str, entry: object) -> Segment:
+def _checked_segment(joint: str, entry: object) -> Segment:
     """Return a segment of a joint from its JSON form [phase, N m/rad, rad]; raise `SpringfootError` for bad numbers."""
     if not isinstance(entry, (list, tuple)) or len(entry) != 3:
         raise SpringfootError(f"{joint} segment must be [phase, N m/rad, rad], got {entry!r:.80}")
