@@ -9,6 +9,7 @@ All persons walk the same episodes on all feet, undisturbed at two commanded spe
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from os.path import isfile
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -83,11 +84,16 @@ def _prices(price: str, walks: Sequence[Sequence[_Walk]]) -> NDArray:
 
 
 def named_feet(values: Sequence[str]) -> dict[str, Any]:
-    """Return name -> setting of the feet of `values` of a flag: kinds, JSON or files, named by their words or file."""
+    """Return name -> setting of the feet of `values` of a flag: kinds, JSON or files, named by their words or file.
+
+    Raises `SpringfootError` for two feet of one name.
+    """
     named = {}
     for words in values:
         foot = read_foot_flag(words)
-        name = Path(words).stem if Path(words).suffix else foot_words(settings_from(left_foot=foot).left_foot)
+        name = Path(words).stem if isfile(words) else foot_words(settings_from(left_foot=foot).left_foot)
+        if named.get(name, foot) != foot:
+            raise SpringfootError(f"--foot: two feet are called {name!r}; give each foot once, or rename a file")
         named[name] = foot
     return named
 

@@ -5,6 +5,8 @@ import csv
 import pytest
 
 from springfoot.cli.main import main
+from springfoot.errors import SpringfootError
+from springfoot.studies.feet.foot_choice import named_feet
 
 QUICK = ["feet", "--quick", "--threads", "1"]
 
@@ -81,3 +83,16 @@ def test_bad_input_is_one_line(words, error, tmp_path, monkeypatch, capsys):
     told = capsys.readouterr().err
     assert code == 2 and error in told and told.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
+
+
+def test_feet_have_their_words_or_the_name_of_their_file(tmp_path):
+    file = tmp_path / "mine.json"
+    file.write_text('{"kind": "weak", "strength": 0.2}', encoding="utf-8")
+    weak = [f'{{"kind": "weak", "strength": {strength}}}' for strength in (0.25, 0.5)]
+    named = named_feet([*weak, str(file), "rigid"])
+    assert list(named) == [f"weak (strength {share} (of the sound leg))" for share in (0.25, 0.5)] + ["mine", "rigid"]
+    other = tmp_path / "other" / "mine.json"
+    other.parent.mkdir()
+    other.write_text('{"kind": "rigid"}', encoding="utf-8")
+    with pytest.raises(SpringfootError, match=r"^--foot: two feet are called 'mine'; give each foot once"):
+        named_feet([str(file), str(other)])
