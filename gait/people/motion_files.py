@@ -55,6 +55,10 @@ class Trial:
     """Curves in N or N m, still to be divided by body weight or mass."""
     knee_as_read: bool = False
     """True if knee and knee moment have the sign of the model's coordinate, which only the angle can tell."""
+    forces_along_x: bool = False
+    """True if `grf_forward` is along the laboratory's x, which only the walk's direction can turn."""
+    backward: bool = False
+    """True if the file tells that the walk is towards the laboratory's -x."""
     contacts: Mapping[str, Contacts] = field(default_factory=dict)
     """Side -> events in the file."""
     speed: float | None = None
@@ -185,7 +189,6 @@ def opensim_trial(path: Path, renamed: Mapping[str, str] = NO_NAMES) -> Trial:
     travelled = table.numbers("pelvis_tx")[[0, -1]] if "pelvis_tx" in names else np.zeros(2)
     time = table.ascending("time")
     velocity = float(np.diff(travelled)[0] / (time[-1] - time[0])) if len(time) > 1 else 0.0
-    forward = -1.0 if velocity < -WALKING_SPEED else 1.0
     for side, curves in legs.items():
         for name in curves:
             curves[name] = curves[name] * unit
@@ -198,13 +201,15 @@ def opensim_trial(path: Path, renamed: Mapping[str, str] = NO_NAMES) -> Trial:
         if force:
             curves["grf_vertical"] = table.numbers(lower[f"{force}y"])
             if f"{force}x" in lower:
-                curves["grf_forward"] = forward * table.numbers(lower[f"{force}x"])
+                curves["grf_forward"] = table.numbers(lower[f"{force}x"])
     return Trial(
         name=path.name,
         time=time,
         legs=not_empty(path.name, legs),
         unscaled=(*(f"{curve}_moment" for curve in _OPENSIM.values()), *FORCES),
         knee_as_read=True,
+        forces_along_x=True,
+        backward=velocity < -WALKING_SPEED,
         speed=abs(velocity) if abs(velocity) > WALKING_SPEED else None,
         columns=as_read.columns,
         notes=notes,

@@ -128,10 +128,13 @@ def merge_trials(trials: Sequence[Trial]) -> MeasuredWalk:
     legs: dict[str, Series] = {}
     unscaled = set()
     unsigned = {}  # side -> curves whose sign is that of the model's coordinate
+    heading = -1.0 if any(trial.backward for trial in trials) else 1.0  # often another file's than the forces'
     for trial in trials:
         for side, curves in trial.legs.items():
             for curve in curves.keys() - legs.get(side, {}).keys():
-                legs.setdefault(side, {})[curve] = np.interp(time, trial.time, curves[curve])
+                along_x = trial.forces_along_x and curve == "grf_forward"
+                values = heading * curves[curve] if along_x else curves[curve]
+                legs.setdefault(side, {})[curve] = np.interp(time, trial.time, values)
                 if trial.knee_as_read and curve in ("knee", "knee_moment"):
                     unsigned.setdefault(side, set()).add(curve)
                 if curve in trial.unscaled:

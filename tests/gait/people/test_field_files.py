@@ -44,16 +44,16 @@ FORCE_NAMES = {
 }
 
 
-def opensim(form, folder, *, speed=1.3, kinetic=True, degrees=True, says=None, paths=False, wrong=None):
+def opensim(form, folder, *, speed=1.3, kinetic=True, degrees=True, says=None, paths=False, ahead=1.0, wrong=None):
     """Write angles, forces and moments as people's tools do; `says` is the word for inDegrees, "" leaves the line out,
-    `wrong` maps beginnings or ends of columns to factors."""
+    `ahead` -1 walks towards the laboratory's -x, `wrong` maps beginnings or ends of columns to factors."""
     time, legs = walk(speed)
     unit = 180 / np.pi if degrees else 1.0
     knee = -1.0 if form == "gait2392" else 1.0
     says = ("yes" if degrees else "no") if says is None else says
     head = [f"inDegrees={says}"] if says else []
     path_of = "/jointset/joint/{}/value" if paths else "{}"
-    angles = {"pelvis_tilt": unit * (legs["left"]["thigh"] - legs["left"]["hip"]), "pelvis_tx": speed * time}
+    angles = {"pelvis_tilt": unit * (legs["left"]["thigh"] - legs["left"]["hip"]), "pelvis_tx": ahead * speed * time}
     forces, moments = {}, {}
     for side, start in zip(("right", "left"), FORCE_NAMES[form], strict=True):
         curves = legs[side]
@@ -64,7 +64,7 @@ def opensim(form, folder, *, speed=1.3, kinetic=True, degrees=True, says=None, p
             angles[name] = 0.0 * time if still else unit * sign * curves[joint]
             moments[f"{name}_moment"] = -sign * MASS * curves.get(f"{joint}_moment", 0.0 * time)
         for axis, force in (("y", "grf_vertical"), ("x", "grf_forward")):
-            forces[f"{start}{axis}"] = MASS * GRAVITY * curves[force]
+            forces[f"{start}{axis}"] = MASS * GRAVITY * (ahead if axis == "x" else 1.0) * curves[force]
         forces[f"{start[:-1]}px"] = speed * time
     for end, factor in (wrong or {}).items():
         for columns in (angles, forces, moments):
@@ -128,6 +128,7 @@ RIGHT = {
     **{f"{form} in radians": (opensim, form, {"degrees": False}) for form in FORCE_NAMES},
     **{f"{form} says nothing of degrees": (opensim, form, {"says": ""}) for form in FORCE_NAMES},
     **{f"{form} says nothing of radians": (opensim, form, {"says": "", "degrees": False}) for form in FORCE_NAMES},
+    **{f"{form} towards -x": (opensim, form, {"ahead": -1.0}) for form in FORCE_NAMES},
     **{f"{form} with paths": (opensim, form, {"paths": True}) for form in FORCE_NAMES},
     **{f"Visual3D at {v}": (visual3d, None, {"speed": v}) for v in SPEEDS},
     "Visual3D, angles alone": (visual3d, None, {"kinetic": False}),
