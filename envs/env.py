@@ -303,7 +303,7 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
         return self.biped.observe()[0], _info(values[0], np.int64(0))
 
     def step(self, action: NDArray) -> tuple[NDArray, float, bool, bool, dict[str, Any]]:
-        """Hold the stiffness that `action` (4,) stands for during a step, 20 ms by default."""
+        """Hold what `action` (A,) sets, by default stiffness of ankles and toes, during a step, by default 20 ms."""
         if self._over:
             raise SpringfootError("no episode is running: call reset() before step()")
         action = real_numbers("action", action)
