@@ -18,7 +18,7 @@ from springfoot.gait.body.tissue import TENDON_SHARE
 
 from ..physics.kernel import kernel, part
 from ..physics.model import ANKLE, HIP, KNEE, TOE
-from ..physics.muscles import passive_moments, tissue_stiffness
+from ..physics.muscles import muscleless_moments, tissue_stiffness
 from ..physics.timing import CONTROL_WINDOW
 from ..settings.settings import BipedSettings
 from .foot_rows import device, foot_lines, foot_rows, has_lines_of
@@ -205,7 +205,7 @@ def _leave_tissue(control, angle, scale):
 
     Where muscles act, the moment of the tissue is a part of theirs.
     """
-    moment = passive_moments(angle[HIP], angle[KNEE], angle[ANKLE], angle[TOE])[ANKLE]  # plantarflexion positive
+    moment = muscleless_moments(angle[HIP], angle[KNEE], angle[ANKLE], angle[TOE])[ANKLE]  # plantarflexion positive
     control[ANKLE, 0] = scale * tissue_stiffness(angle[KNEE], angle[ANKLE])
     control[ANKLE, 1] = control[ANKLE, 0] * angle[ANKLE] - scale * moment
 

@@ -46,7 +46,7 @@ MUSCLE_ROW = np.dtype(
 )
 """Recent work of the muscles of one body."""
 
-passive_moments = part(tissue_moments)
+muscleless_moments = part(tissue_moments)
 """`tissue_moments`, compiled."""
 _interval_work = part(interval_work)
 _metabolic_energy = part(metabolic_energy)
@@ -129,7 +129,7 @@ def work_muscles(row, m, segments, velocity, control) -> None:
     for side in range(2):
         for joint in range(4):
             middle[joint] = 0.5 * (row.angle[side, joint] + m.angle[side, joint])
-        tissue = passive_moments(middle[0], middle[1], middle[2], middle[3])
+        tissue = muscleless_moments(middle[0], middle[1], middle[2], middle[3])
         for joint in range(4):
             dof = 3 + 4 * side + joint  # behind the trunk's x, z and pitch
             mean_torque = first = second = 0.0

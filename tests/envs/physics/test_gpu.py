@@ -16,7 +16,7 @@ def main(monkeypatch, *words):
 def test_what_is_missing_is_said_in_one_line(monkeypatch, capsys):
     assert main(monkeypatch, "--device", "nowhere") == 2
     last = capsys.readouterr().err.splitlines()[-1]
-    assert last.startswith("gpu: error: no device 'nowhere'") or "pip install springfoot[gpu]" in last
+    assert last.startswith("gpu: error: no device 'nowhere'") or "pip install 'springfoot[gpu]'" in last
 
 
 def test_it_walks_as_c_mujoco_does(monkeypatch, capsys):

@@ -227,7 +227,8 @@ def test_sliders_of_a_passive_foot_set_the_k_that_acts_in_mujoco(with_person):
     session = with_person
     session.ask(**{"right_foot.kind": "passive", "right_foot.ankle_stiffness": 310.0, "right_foot.toe_stiffness": 45.0})
     assert session.step().stiffness[1] == pytest.approx([310.0, 45.0])
-    assert np.array_equal(session.frame.stiffness, acting(session))
+    told = session.frame.stiffness
+    assert np.array_equal(told[told > 0.0], acting(session)[told > 0.0])  # a slack ankle has its tissue's, told as 0
 
 
 def test_another_kind_keeps_orthosis_and_segments_and_forgets_other_numbers(with_person):
