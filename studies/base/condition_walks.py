@@ -29,20 +29,26 @@ class ConditionWalks:
     """Function that returns a policy by its name, and its settings from those given."""
 
     def walk(self, policy: str, conditions: Sequence[Mapping[str, Any]], progress: OnProgress) -> list[dict[str, Any]]:
-        """Return the numbers of a policy's walk under each of several conditions: settings that differ from the usual.
+        """Return the `measured` numbers of a policy's walk under each condition, in the order of `conditions`.
 
-        Conditions that differ in feet alone are walked side by side.
+        A condition is settings that differ from the usual. Walks in `kept` are not walked again; conditions that differ
+        in feet alone are walked side by side.
         """
         numbers: dict[str, dict[str, Any]] = {}
-        for rest in {str(without_feet(given)): without_feet(given) for given in conditions}.values():
-            alike = [given for given in conditions if without_feet(given) == rest]
+        for but_feet in {str(without_feet(condition)): without_feet(condition) for condition in conditions}.values():
+            alike = [condition for condition in conditions if without_feet(condition) == but_feet]
             questions = [
-                [{**self.study.walked, "seconds": self.study.seconds}, policy, given, self.names] for given in alike
+                [{**self.study.walked, "seconds": self.study.seconds}, policy, condition, self.names]
+                for condition in alike
             ]
 
-            def make(missing: list[int], rest: dict[str, Any] = rest, alike: Any = alike) -> list[dict[str, Any]]:
-                """Walk side by side those of the conditions that are missing; return their numbers."""
-                act, settings = self.find(policy, {**rest, "episode_seconds": self.study.seconds})
+            def make(
+                missing: list[int],
+                but_feet: Mapping[str, Any] = but_feet,
+                alike: Sequence[Mapping[str, Any]] = alike,
+            ) -> list[dict[str, Any]]:
+                """Walk the conditions `alike` of the `missing` indices side by side; return their numbers."""
+                act, settings = self.find(policy, {**but_feet, "episode_seconds": self.study.seconds})
                 feet = [
                     {name: alike[index][name] for name in FOOT_SETTINGS if name in alike[index]} for index in missing
                 ]
@@ -50,9 +56,9 @@ class ConditionWalks:
                 return [self.measured(recording) for recording in recordings]
 
             numbers |= zip(map(str, alike), self.kept.get_all(questions, make), strict=True)
-        return [numbers[str(given)] for given in conditions]
+        return [numbers[str(condition)] for condition in conditions]
 
 
-def without_feet(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return settings but those of feet."""
-    return {name: value for name, value in given.items() if name not in FOOT_SETTINGS}
+def without_feet(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Return `settings` without the feet of either side (`FOOT_SETTINGS`)."""
+    return {name: value for name, value in settings.items() if name not in FOOT_SETTINGS}

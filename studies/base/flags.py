@@ -54,7 +54,7 @@ def read_own_gait(words: str, trust_units: bool = False, mass: float | None = No
 
 
 def files_of(words: str) -> tuple[list[str], str | None]:
-    """Return the files, and the condition in them, that the value of `--human` names, as of `read_own_gait`."""
+    """Return the file names in the value of `--human`, and the condition after its colon; None without a colon."""
     if not Path(words).is_file():
         file, _, after_colon = words.rpartition(":")
         if "," in words:
@@ -204,8 +204,9 @@ def _given_words(flags: Any) -> dict[str, Any]:
     return values
 
 
-def _evaluated(theme: str) -> str:
-    """Return the help of a theme in an evaluation, which says which of its settings a trained policy brings."""
+def _evaluation_help(theme: str) -> str:
+    """Return the help of a theme of settings in an evaluation; it lists the flags whose values a trained policy brings
+    with it."""
     settings = [name for name, theme_of_name in THEME_OF.items() if theme_of_name == theme]
     settings = [name for name in settings if name != "episode_seconds"]  # the flag --seconds
     brought = [f"--{name.replace('_', '-')}" for name in settings if name not in CONDITION_SETTINGS]
@@ -214,7 +215,7 @@ def _evaluated(theme: str) -> str:
     return f"{THEMES[theme]} Of these a trained policy brings {' and '.join(brought) or 'nothing'} with it."
 
 
-EVALUATED = {theme: _evaluated(theme) for theme in THEMES}
+EVALUATED = {theme: _evaluation_help(theme) for theme in THEMES}
 """Theme -> its help in an evaluation."""
 SettingsFlags = optional_flags("SettingsFlags", BipedSettings, BipedSettings(), themes=EVALUATED)
 """Every environment setting as an optional flag of an evaluation, in groups by theme (dataclass for `tyro`)."""

@@ -34,8 +34,9 @@ def mean_interval(values: NDArray, level: float = LEVEL) -> tuple[float, float]:
 
 
 def visible(differences: NDArray) -> float | None:
-    """Return the smallest mean that paired differences (n,) of this spread show with the chance `POWER`: the sum of the
-    two normal quantiles times the standard error. None for a single one, and where both walk the same."""
+    """Return the smallest true mean difference that n paired differences (n,) of this spread detect with the chance
+    `POWER`: the sum of the two normal quantiles times the standard error. None for a single difference, and where all
+    are 0."""
     if len(differences) < 2 or not differences.any():
         return None
     error = np.std(differences, ddof=1) / np.sqrt(len(differences))

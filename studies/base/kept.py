@@ -18,10 +18,10 @@ class Kept:
 
     def __init__(self, path: Path | None):
         self._path = path
-        self._known: dict[str, Any] = {}
+        self._results: dict[str, Any] = {}
         if path is not None and path.exists():
-            self._known = read_object(path, "file of a study's numbers")
-            if not all(isinstance(result, dict) for result in self._known.values()):
+            self._results = read_object(path, "file of a study's numbers")
+            if not all(isinstance(result, dict) for result in self._results.values()):
                 raise SpringfootError(f"{path} is no file of a study's numbers: each must be an object in braces")
 
     def get(self, question: Any, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
@@ -32,15 +32,15 @@ class Kept:
     def get_all(
         self, questions: Sequence[Any], make: Callable[[list[int]], Sequence[dict[str, Any]]]
     ) -> list[dict[str, Any]]:
-        """Return the kept result for each of several questions; `make` those that are missing together, and keep them.
+        """Return the result for each question, in order; call `make` once for all that are not kept, and keep those.
 
-        `make` returns the results for the indices of questions that it is called with.
+        `make` gets the indices of the missing questions, and returns their results.
         """
         texts = [json.dumps(question, sort_keys=True) for question in questions]
-        missing = [index for index, text in enumerate(texts) if text not in self._known]
+        missing = [index for index, text in enumerate(texts) if text not in self._results]
         if missing:
-            self._known |= zip([texts[index] for index in missing], make(missing), strict=True)
+            self._results |= zip([texts[index] for index in missing], make(missing), strict=True)
             if self._path is not None:
                 self._path.parent.mkdir(parents=True, exist_ok=True)
-                write_atomically(self._path, (json.dumps(self._known, indent=1) + "\n").encode())
-        return [self._known[text] for text in texts]
+                write_atomically(self._path, (json.dumps(self._results, indent=1) + "\n").encode())
+        return [self._results[text] for text in texts]

@@ -55,7 +55,8 @@ class MotionFiles(Study):
         Body(height=self.height)
 
     def read(self, skip: float | None = 0.0) -> MeasuredPerson:
-        """Return the walk in the files; `skip` as of `read_person`."""
+        """Return the person measured in the files, without the first `skip` seconds of the walk; None leaves out 3 s of
+        a long walk (`read_person`)."""
         named = [files_of(words) for words in self.files]
         condition = named[0][1] if len(named) == 1 else None
         return read_person(
@@ -70,7 +71,8 @@ class MotionFiles(Study):
         )
 
     def readings(self, measured: MeasuredPerson, norm: HumanGait, without_mass: str = "") -> list[str]:
-        """Return sentences on files, strides, speed, mass and norm; `without_mass` tells what an unknown mass means."""
+        """Return sentences for the report on files, strides, speed, mass and norm; `without_mass` follows "Mass:
+        unknown"."""
         gait = measured.gait
         speed = "as given" if self.speed else "from the files"
         return [
@@ -87,7 +89,7 @@ class MotionFiles(Study):
 
 
 def _strides(measured: MeasuredPerson) -> str:
-    """Return the number of strides of each leg in words."""
+    """Return the number of strides of each leg in words, and how many of them stood on a force plate unless all did."""
     counts = {side: len(leg.times) for side, leg in measured.legs.items() if len(leg.times)}
     if not counts:
         return "mean curves" if measured.gait.strides is None else f"mean curves of {measured.gait.strides}"

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from springfoot.envs.control import LegConstants
 from springfoot.evaluation.numbers import measure
 from springfoot.evaluation.recording import policy_and_settings, record
 
@@ -29,7 +30,9 @@ class PushedWalks:
     progress: OnProgress = lambda seconds: None
     """Function called with the simulated time [s] of each step."""
 
-    def metrics(self, policy: str, settings: dict[str, Any] | None = None, legs: Any = None) -> dict[str, Any]:
+    def metrics(
+        self, policy: str, settings: dict[str, Any] | None = None, legs: LegConstants | None = None
+    ) -> dict[str, Any]:
         """Return the metrics of walks of the policy of that name, by condition: `undisturbed` and `pushed`.
 
         The reward is the default one. `settings` are further environment settings; `legs` are leg constants in place of
@@ -58,11 +61,10 @@ class PushedWalks:
 
 
 def kept_metrics(path: Path, walks: PushedWalks, key: Any, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-    """Return the metrics kept in the file `path` for these `walks` of what `key` names; `make` and keep them if
-    missing.
+    """Return the metrics that the file `path` keeps for `walks` and `key`; else call `make` and keep its result.
 
-    `key` are JSON values that tell walks of other policies, settings or legs apart. Threads and progress are left out
-    of the question, as the metrics do not depend on them.
+    `key` is a JSON value that differs between policies, settings and leg constants. Threads and progress do not count:
+    the metrics do not depend on them.
     """
     question = {"how": {**vars(walks), "threads": None, "progress": None}, "of": key}
     return Kept(path).get(question, make)

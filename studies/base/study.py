@@ -146,8 +146,8 @@ class WalkingStudy(Study):
 
     @property
     def walked(self) -> dict[str, Any]:
-        """Return what flags decide of each walk, as JSON values, with which its numbers are kept; threads decide
-        nothing."""
+        """Return `how` as JSON values, a part of the question under which a walk's numbers are kept; with threads 0, as
+        their number does not change the walk."""
         return {**self.how, "threads": 0}
 
 

@@ -64,7 +64,7 @@ class Springs:
 
     @property
     def conditions(self) -> dict[float, str]:
-        """Return stiffness -> name of the condition."""
+        """Return stiffness [N m/rad] -> name of its condition in `CONTROLS`."""
         return {k: f"{f'{k:g} N·m/rad' if k else 'slack'}, {self.name}" for k in self.settings}
 
 
@@ -120,12 +120,14 @@ class Controls(WalkingStudy):
     @property
     def total(self) -> float:
         """Return the simulated time of all walks if none falls [s]."""
-        return len(self.policies) * len(CONTROLS) * len(self._asked()) * self.episodes * self.seconds
+        return len(self.policies) * len(CONTROLS) * len(self._commanded_speeds()) * self.episodes * self.seconds
 
     def ask(self, progress: OnProgress) -> Answer:
-        """Walk with every policy under every condition."""
+        """Walk with every policy under every condition and commanded speed; compare where all walk equally fast."""
         asked = [
-            (name, speed, {**given, "speed": speed}) for name, given in CONTROLS.items() for speed in self._asked()
+            (name, speed, {**given, "speed": speed})
+            for name, given in CONTROLS.items()
+            for speed in self._commanded_speeds()
         ]
         walks = [
             {"policy": policy, "condition": name, "speed_m_s": speed, **numbers}
@@ -143,23 +145,25 @@ class Controls(WalkingStudy):
     def walk(
         self, policy: str, conditions: Sequence[Mapping[str, Any]], progress: OnProgress = lambda seconds: None
     ) -> list[dict[str, float | None]]:
-        """Return, for each of several conditions, the share of episodes that fall, walked speed and prices; None where
-        they cannot be measured."""
-        under = ConditionWalks(study=self, measured=_prices_of, names=CONTROL_PRICES, kept=Kept(self.keep))
-        return under.walk(policy, conditions, progress)
+        """Return the numbers of `_control_numbers` for a policy's walk under each of `conditions`; those in the file
+        `keep` are not walked again."""
+        walks = ConditionWalks(study=self, measured=_control_numbers, names=CONTROL_PRICES, kept=Kept(self.keep))
+        return walks.walk(policy, conditions, progress)
 
-    def _asked(self) -> Sequence[float]:
+    def _commanded_speeds(self) -> Sequence[float]:
+        """Return the commanded speeds [m/s]."""
         return (0.8, 1.0, 1.2) if self.quick else ASKED_SPEEDS
 
 
-def _prices_of(recording: Recording) -> dict[str, float | None]:
-    """Return the numbers of a walk, by `CONTROL_PRICES`."""
+def _control_numbers(recording: Recording) -> dict[str, float | None]:
+    """Return the share of episodes that fall, the walked speed [m/s] and the prices `CONTROL_PRICES` of a recording;
+    None where they cannot be measured."""
     metrics = measure(recording).metrics
     return price_numbers(metrics) | {CONTROL_PRICES[-1]: metrics["effort"]["net_joint_J_kg_m"]}
 
 
-def _prices(even: Sequence[Row]) -> dict[tuple[str, str, float], Row]:
-    """Return (policy, condition, speed) -> row of `at_walked_speeds`."""
+def _rows_by_walk(even: Sequence[Row]) -> dict[tuple[str, str, float], Row]:
+    """Return (policy, condition, walked speed [m/s]) -> its row, from rows of `at_walked_speeds`."""
     return {(row["policy"], row["condition"], row["speed_m_s"]): row for row in even}
 
 
@@ -168,7 +172,7 @@ def controls_table(even: Sequence[Row]) -> str:
 
     `even` are rows of `at_walked_speeds`. Of several policies it has the means, and of the differences the range.
     """
-    prices = _prices(even)
+    prices = _rows_by_walk(even)
     policies, conditions, speeds = (list(dict.fromkeys(names)) for names in zip(*prices, strict=True))
     lines = []
     for name in conditions:
@@ -179,8 +183,10 @@ def controls_table(even: Sequence[Row]) -> str:
 
 
 def _cell(pairs: Sequence[tuple[Row, Row]]) -> str:
-    """Return both mean prices of a condition with their differences from the sound walk, for each policy a pair (own,
-    sound); a dash if any has none."""
+    """Return both prices of a condition, means over policies, with their differences from the sound walk.
+
+    `pairs` has for each policy its row under the condition and its row of the sound walk. A dash if a price is None.
+    """
     if any(row[price] is None for pair in pairs for row in pair for price in TWO_PRICES):
         return MISSING
     shown = []
@@ -196,17 +202,17 @@ def _cell(pairs: Sequence[tuple[Row, Row]]) -> str:
 def best_springs(even: Sequence[Row]) -> list[dict[str, Any]]:
     """Return the best stiffness [N m/rad] of `TRIED_SPRINGS` and its saving, for each policy, price and walked speed.
 
-    The best is that of `lowest`. The saving is a share of the price that it is compared with, > 0
-    if the spring is cheaper. None where nobody walks.
+    The best stiffness is that of `lowest`. The saving is a share of the price under the condition `Springs.against`,
+    > 0 if the spring is cheaper. None where no price is known.
     """
-    prices = _prices(even)
+    prices = _rows_by_walk(even)
     policies, _, speeds = (list(dict.fromkeys(names)) for names in zip(*prices, strict=True))
     rows = []
     for who, springs, at, price in product(policies, TRIED_SPRINGS, speeds, TWO_PRICES):
         without = prices[who, springs.against, at][price]
         walked = {k: prices[who, name, at][price] for k, name in springs.conditions.items()}
-        known = {k: value for k, value in walked.items() if value is not None}
-        best, least = lowest(known) if known else (None, None)
+        priced = {k: value for k, value in walked.items() if value is not None}
+        best, least = lowest(priced) if priced else (None, None)
         saving = None if least is None or without is None else 1.0 - least / without
         named = {"policy": who, "springs": springs.name, "speed_m_s": at, "price": price}
         rows.append({**named, "best_N_m_rad": best, "saving": saving})
@@ -234,7 +240,8 @@ def best_table(best: Sequence[Row]) -> str:
 
 
 def _span(rows: Sequence[Row]) -> str:
-    """Return the least and largest best stiffness and saving of rows of `best_springs`."""
+    """Return best stiffness [N m/rad] and saving as a cell, from `rows` of `best_springs`, one for each policy: the
+    least and the largest of each, a dash if a saving is None."""
     if any(row["saving"] is None for row in rows):
         return MISSING
     ends = []

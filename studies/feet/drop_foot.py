@@ -58,7 +58,7 @@ class DropFoot(WalkingStudy):
         return walks * self.episodes * self.seconds
 
     def ask(self, progress: OnProgress) -> Answer:
-        """Walk with every spring."""
+        """Walk with every policy on every spring, undisturbed and pushed; tabulate and draw each policy's walks."""
         rows = [row for policy in self.policies for row in self._walks(policy, progress)]
         texts = []
         files: dict[str, Any] = {"drop.csv": rows_csv(rows)}
@@ -77,7 +77,10 @@ class DropFoot(WalkingStudy):
         return Answer(text="\n\n".join([*texts, note]), files=files)
 
     def _walks(self, policy: str, progress: OnProgress) -> list[dict[str, Any]]:
-        """Return a row for each speed, spring and rest angle."""
+        """Walk with a policy, undisturbed and pushed; return a row for each speed, stiffness and rest angle.
+
+        A row has the numbers of the undisturbed walk, and of the pushed one the falls.
+        """
         rows = []
         springs = list(product(SWING_SPRINGS, SWING_RESTS))
         feet = [
@@ -98,6 +101,7 @@ class DropFoot(WalkingStudy):
         return rows
 
     def _speeds(self) -> Sequence[float]:
+        """Return the commanded speeds [m/s]."""
         return (1.2,) if self.quick else DROP_SPEEDS
 
 
@@ -138,14 +142,14 @@ def drop_text(rows: Sequence[Row], episodes: int) -> str:
 
 
 def _cell(row: Row) -> str:
-    """Return falls, undisturbed / pushed, and toe clearance of a walk, as a cell of a table."""
+    """Return, as a cell, the share of falls, undisturbed / pushed, and the toe clearance [mm]."""
     clearance = MISSING if row["clearance_m"] is None else f"{1000 * row['clearance_m']:.0f} mm"
     return f"{row['falls']:.0%} / {row['falls_pushed']:.0%}, {clearance}"
 
 
 def draw_drop(path: Path, rows: Sequence[Row]) -> None:
-    """Draw maps of toe clearance over stiffness and rest angle, a panel for each speed, crosses where an episode
-    falls."""
+    """Draw maps of toe clearance over stiffness and rest angle, a panel for each speed: x where an episode falls, +
+    where one falls only when pushed."""
     speeds = list(dict.fromkeys(row["speed_m_s"] for row in rows))
     stiffness, rests = (sorted({row[name] for row in rows}) for name in ("spring_Nm_rad", "rest_deg"))
     with matplotlib.rc_context(STYLE):

@@ -65,21 +65,22 @@ class _Walk:
         return float((self.recording.fall_reason != "").mean())
 
     def prices(self, price: str) -> list[float]:
-        """Return a price of each episode."""
+        """Return each episode's number in the column `price` of `TWO_PRICES`: fibre work [J/kg/m] or effort [-]."""
         key = {"fibre_J_kg_m": "fibre_J_kg_m", "effort": "total"}[price]
         body = body_of(self.recording.settings)
         return [effort_numbers([episode], body)[key] for episode in self.gait.tally.effort]
 
 
-def _walked(walks: Sequence[Sequence[_Walk]]) -> NDArray | None:
-    """Return the speeds (2, P, E) [m/s] of two walks of P persons; None if somebody fell."""
+def _walked_speeds(walks: Sequence[Sequence[_Walk]]) -> NDArray | None:
+    """Return the walked speeds (2, P, E) [m/s] of P persons in E episodes at two commanded speeds; None if an episode
+    fell. `walks` has a list of persons' walks for each commanded speed."""
     if any(walk.falls for at_speed in walks for walk in at_speed):
         return None
     return np.array([[walk.gait.tally.speed for walk in at_speed] for at_speed in walks])
 
 
-def _prices(price: str, walks: Sequence[Sequence[_Walk]]) -> NDArray:
-    """Return a price (2, P, E) of two walks of P persons."""
+def _episode_prices(price: str, walks: Sequence[Sequence[_Walk]]) -> NDArray:
+    """Return the prices (2, P, E) of `walks` in the column `price` of `TWO_PRICES`, axes as of `_walked_speeds`."""
     return np.array([[walk.prices(price) for walk in at_speed] for at_speed in walks])
 
 
@@ -164,7 +165,7 @@ class FootChoice(WalkingStudy):
         return 3 * len(self.persons) * len(self.feet) * self.episodes * self.seconds
 
     def ask(self, progress: OnProgress) -> Answer:
-        """Walk on every foot."""
+        """Walk every person on every foot, at two commanded speeds and pushed; compare prices at one walked speed."""
         names = list(self.feet)
         given = {"height": self.height, "mass": self.mass, "speed": self.speed, "episode_seconds": self.seconds}
         persons = [person_and_settings(name, given) for name in self.persons]
@@ -178,11 +179,11 @@ class FootChoice(WalkingStudy):
                 falls = {"falls_other_speed": other_walk.falls, "falls_pushed": pushed_walk.falls}
                 rows.append({"person": person, "foot": name, **numbers_of(walk.gait, self.side), **falls})
         pairs = [[[of[index] for of in at] for at in (walks, slower)] for index in range(len(names))]
-        walked = [_walked(pair) for pair in pairs]
+        walked = [_walked_speeds(pair) for pair in pairs]
         speed = common_speed(self.speed, walked)
         prices = {
             price: [
-                None if speeds is None else price_at(speed, speeds, _prices(price, pair))
+                None if speeds is None else price_at(speed, speeds, _episode_prices(price, pair))
                 for pair, speeds in zip(pairs, walked, strict=True)
             ]
             for price in TWO_PRICES
@@ -190,7 +191,7 @@ class FootChoice(WalkingStudy):
         shown = [(walk.recording, walk.gait) for walk in walks[0]]
         files = {
             "feet.csv": rows_csv(rows),
-            "prices.csv": rows_csv(self._compared(prices, speed)),
+            "prices.csv": rows_csv(self._price_rows(prices, speed)),
             "feet.png": partial(self._draw, names=names, prices=prices),
             "report.html": partial(write_page, walks=shown, command=self.command, words_of=self._words_of()),
         }
@@ -206,16 +207,18 @@ class FootChoice(WalkingStudy):
     def _walk(
         self, act: PolicyFunction, settings: BipedSettings, progress: OnProgress, **changed: float
     ) -> list["_Walk"]:
-        """Return a person's walks on all feet, each named by its foot, with the `changed` settings."""
+        """Return a person's walk on each of `feet`, in order; `changed` settings replace those of `settings`."""
         feet = [dict.fromkeys(SIDES_OF[self.side], foot) for foot in self.feet.values()]
         settings = replace(settings, **changed)
         recordings = record_feet(act, settings, feet, name="person", progress=progress, **self.how)
         named = [replace(recording, policy=name) for recording, name in zip(recordings, self.feet, strict=True)]
         return [_Walk(recording=recording, gait=measure(recording)) for recording in named]
 
-    def _compared(self, prices: Mapping[str, Sequence[NDArray | None]], speed: float) -> list[Row]:
-        """Return a row for each foot, person and episode, with the prices at the walked `speed` [m/s] that the answer
-        compares; None on a foot without a price."""
+    def _price_rows(self, prices: Mapping[str, Sequence[NDArray | None]], speed: float) -> list[Row]:
+        """Return a row for each person, foot and episode, with both prices at the walked `speed` [m/s].
+
+        `prices` has, by column, the prices (persons, episodes) on each foot; None on a foot without a price.
+        """
         return [
             {"person": person, "foot": foot, "seed": self.seed + episode, "speed_m_s": speed}
             | {
@@ -228,7 +231,7 @@ class FootChoice(WalkingStudy):
         ]
 
     def _words_of(self) -> Callable[[FootSetting], str]:
-        """Return a function that names feet for the report: springs in the user's unit."""
+        """Return a function that puts a foot of the report in words: a spring in N·m/deg, as in the flag `--spring`."""
         if not self.spring:
             return foot_words
         beside = "" if self.calf is None else f" beside a calf of {self.calf:.0%}"
@@ -345,16 +348,17 @@ def _where(asked: float, speed: float, walked: Sequence[NDArray | None]) -> str:
 
 
 def _change(prices: NDArray | None, first: NDArray | None) -> str:
-    """Return the difference of prices from those of the first foot in words."""
+    """Return the difference of a foot's prices (persons, episodes) from those of the `first` foot, in words; a dash if
+    either is None."""
     return MISSING if prices is None or first is None else difference(prices, first).text
 
 
 def _mean(rows: Sequence[Row], key: str, pattern: str) -> str:
-    """Return the mean of a number over persons, in words."""
+    """Return the mean of the column `key` over `rows`, one for each person; a dash if a value is None."""
     values = [row[key] for row in rows]
     return text_of(None if None in values else float(np.mean(values)), pattern)
 
 
 def _share(rows: Sequence[Row], key: str) -> str:
-    """Return a share of the episodes of all persons in percent."""
+    """Return the mean of the share in the column `key` over `rows`, one for each person, in percent."""
     return f"{float(np.mean([row[key] for row in rows])):.0%}"

@@ -62,15 +62,16 @@ TOLD = ("the truth", SOUND_FOOT)
 
 
 def told_sound(act: PolicyFunction, settings: BipedSettings) -> PolicyFunction:
-    """Return the policy as it acts if the observation says that both feet are sound."""
+    """Return a policy that acts as `act` does if the observation's entries on the worn feet are those of sound feet."""
     names = [entry.name for entry in PERSON_OBSERVATION]
     first = len(names) - WORN
     sound = worn_entries(body_of(settings), SOUND)
 
     def acting(observation: NDArray) -> NDArray:
-        told = observation.copy()
-        told[..., first:] = sound
-        return act(told)
+        """Return the actions of `act` for observations (..., entries) that say "both feet are sound"."""
+        changed = observation.copy()
+        changed[..., first:] = sound
+        return act(changed)
 
     return acting
 
@@ -93,19 +94,20 @@ class FootMap(WalkingStudy):
 
     @property
     def total(self) -> float:
-        """Simulated seconds without falls."""
+        """Return the simulated time of all walks if none falls [s]."""
         feet = sum(map(len, MAPPED_FEET.values()))
         return len(self.persons) * (len(TOLD) * feet + len(FLAT)) * self.episodes * self.seconds
 
     def ask(self, progress: OnProgress) -> Answer:
-        """Walk every person on every foot."""
-        rows = [row for person in self.persons for row in self._feet(person, progress)]
-        flat = [row for person in self.persons for row in self._flat(person, progress)]
+        """Walk every person on every foot of the map, and with ankles of one stiffness."""
+        rows = [row for person in self.persons for row in self._foot_rows(person, progress)]
+        flat = [row for person in self.persons for row in self._flat_rows(person, progress)]
         text = f"{map_table(rows)}\n\n{flat_table(flat)}\n\n{self.what_ran} of each, commanded {self.speed:g} m/s."
         return Answer(text=text, files={"feet.csv": rows_csv(rows), "flat.csv": rows_csv(flat)})
 
-    def _feet(self, person: str, progress: OnProgress) -> list[dict[str, Any]]:
-        """Return a row for each foot, told the truth and told that it is sound."""
+    def _foot_rows(self, person: str, progress: OnProgress) -> list[dict[str, Any]]:
+        """Walk a person on every foot of the map, with the true observation and with that of sound feet; return a row
+        for each walk."""
         act, settings = person_and_settings(person, {"speed": self.speed, "episode_seconds": self.seconds})
         groups = [(name, foot) for name, feet in MAPPED_FEET.items() for foot in feet]
         rows = []
@@ -119,8 +121,8 @@ class FootMap(WalkingStudy):
                 rows.append(row | numbers_of(measure(recording)))
         return rows
 
-    def _flat(self, person: str, progress: OnProgress) -> list[dict[str, Any]]:
-        """Return a row for each stiffness of both ankles."""
+    def _flat_rows(self, person: str, progress: OnProgress) -> list[dict[str, Any]]:
+        """Walk a person with both ankles at each stiffness of `FLAT` over the whole stride; return a row for each."""
         given = {"person": str(find_policy(person)), "speed": self.speed, "episode_seconds": self.seconds}
         rows = []
         for stiffness in FLAT:
@@ -135,9 +137,9 @@ class FootMap(WalkingStudy):
 def map_table(rows: Sequence[Row]) -> str:
     """Return the Markdown table of groups of feet, `rows` being those of `FootMap`.
 
-    Falls are of all episodes of a group, told the truth / told that the foot is sound. Speed and prices are means over
-    the feet that nobody falls on who is told the truth; the last column compares the fibre work of who is told that the
-    foot is sound, on the feet that nobody falls on either way.
+    Falls are of all episodes of a group, with the true observation / with that of sound feet. Speed and prices are
+    means over the feet without a fall with the true observation; the last column is the change of fibre work with the
+    observation of sound feet, on the feet without a fall in either walk.
     """
     head = ["right foot", "falls, told the truth / a sound foot", "m/s", "fibre work J/kg/m", "effort"]
     lines = []
@@ -147,29 +149,35 @@ def map_table(rows: Sequence[Row]) -> str:
         walked = [row for row in true if not row["falls"]]
         compared = [pair for pair in zip(true, sound, strict=True) if not any(row["falls"] for row in pair)]
         line = [name, falls, *(_mean(walked, key) for key in ("speed_m_s", "fibre_J_kg_m", "effort"))]
-        lines.append([*line, _dearer(compared)])
+        lines.append([*line, _fibre_work_change(compared)])
     return table([*head, "told a sound foot: fibre work"], lines)
 
 
-def _dearer(compared: Sequence[tuple[Row, Row]]) -> str:
-    """Return the mean change of fibre work from the first to the second walk of each pair, and the number of pairs."""
-    changes = [other["fibre_J_kg_m"] / one["fibre_J_kg_m"] - 1.0 for one, other in compared if other["fibre_J_kg_m"]]
+def _fibre_work_change(compared: Sequence[tuple[Row, Row]]) -> str:
+    """Return the mean change of fibre work from the first to the second row of each pair, and the number of pairs;
+    pairs whose second row has no fibre work are left out."""
+    changes = [
+        second["fibre_J_kg_m"] / first["fibre_J_kg_m"] - 1.0 for first, second in compared if second["fibre_J_kg_m"]
+    ]
     return f"{np.mean(changes):+.0%} (feet: {len(changes)})" if changes else MISSING
 
 
 def _falls(rows: Sequence[Row]) -> int:
-    """Return how many episodes fall."""
+    """Return the number of episodes that fall, over all `rows`."""
     return round(sum(row["falls"] * row["episodes"] for row in rows))
 
 
 def _mean(rows: Sequence[Row], key: str) -> str:
-    """Return the mean of a number over walks, in words."""
-    known = [row[key] for row in rows if row[key] is not None]
-    return text_of(float(np.mean(known)), ".2f") if known else MISSING
+    """Return the mean of the column `key` over `rows`, without those in which it is None; a dash if all are."""
+    values = [row[key] for row in rows if row[key] is not None]
+    return text_of(float(np.mean(values)), ".2f") if values else MISSING
 
 
 def flat_table(rows: Sequence[Row]) -> str:
-    """Return the Markdown table of ankles of one stiffness; `rows` are those of `FootMap`."""
+    """Return the Markdown table of walks with ankles of one stiffness, from rows of `FootMap._flat_rows`.
+
+    Falls are of all persons' episodes; speed and prices are means over the persons without a fall.
+    """
     lines = []
     for stiffness in dict.fromkeys(row["ankle_N_m_rad"] for row in rows):
         here = [row for row in rows if row["ankle_N_m_rad"] == stiffness]

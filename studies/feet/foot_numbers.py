@@ -1,6 +1,6 @@
 """Compute the numbers of a walk on different feet that a designer of feet asks for."""
 
-from typing import Any
+from collections.abc import Iterable
 
 from springfoot.envs.physics import SIDES
 from springfoot.evaluation.numbers import MOMENT_CURVES, Gait, asymmetry, leg_numbers
@@ -52,7 +52,8 @@ def numbers_of(gait: Gait, examined_side: str = "right") -> dict[str, float | No
     return numbers
 
 
-def _sum(values: Any) -> float | None:
+def _sum(values: Iterable[float | None]) -> float | None:
     """Return the sum of values; None if one of them is None."""
-    values = list(values)
-    return None if None in values else float(sum(values))
+    terms = list(values)
+    numbers = [term for term in terms if term is not None]
+    return float(sum(numbers)) if len(numbers) == len(terms) else None

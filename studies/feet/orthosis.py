@@ -45,8 +45,8 @@ class Orthosis(SpringMap):
 
 
 def braced_calf(strength: float, spring: float, rest_deg: float = 0.0) -> dict[str, Any]:
-    """Return the foot below a calf of a share `strength` of a sound one's, in an orthosis of stiffness `spring`
-    [N m/deg] at rest at `rest_deg`; raise `SpringfootError` for a spring out of range."""
+    """Return the setting of a foot in an orthosis of stiffness `spring` [N m/deg] and rest angle `rest_deg`, below a
+    calf of `strength` times a sound calf's; raise `SpringfootError` for a spring out of range."""
     require_within("spring", spring, (0.0, MOST_SPRING), "N m/deg")
     calf = {"kind": "intact"} if strength == 1.0 else {"kind": "weak", "strength": strength}
     return calf | {"orthosis": {"ankle_stiffness": round(spring * PER_DEG, 3), "ankle_deg": rest_deg}}

@@ -68,7 +68,8 @@ def feet_in_words(feet: Feet) -> str:
 def walk_drawn(
     act: PolicyFunction, settings: BipedSettings, episodes: int, threads: int, progress: OnProgress
 ) -> list[DrawnEpisode]:
-    """Walk so many drawn episodes, seeded from `FIRST_SEED` on; return them in order."""
+    """Walk this many `episodes`, whose body, feet, speed and slope a reset draws from the ranges of `settings`; return
+    them in the order of their seeds, from `FIRST_SEED` on."""
     walked = []
     for first in range(0, episodes, _BATCH):
         count = min(_BATCH, episodes - first)
@@ -91,13 +92,14 @@ def walk_drawn(
 
 
 def _settled_speed(com: NDArray) -> float:
-    """Return the evaluation's mean speed of the CoM (T, 2) after `SETTLED_SECONDS` [m/s]; NaN for a shorter walk."""
+    """Return the CoM's mean forward speed after `SETTLED_SECONDS` [m/s], from its positions (T, (x, z)) [m] at each
+    `TICK`; NaN for a shorter walk."""
     settled = round(SETTLED_SECONDS / TICK)
     return mean_speed(com, settled, len(com)) if len(com) > settled else np.nan
 
 
 def speed_errors(episodes: Sequence[DrawnEpisode]) -> NDArray:
-    """Return the distance of the walked from the commanded speed [m/s] of the episodes that did not fall."""
+    """Return |walked - commanded speed| [m/s] of each episode that did not fall; the others are left out."""
     return np.array([abs(episode.walked - episode.speed) for episode in episodes if not episode.fell])
 
 
@@ -121,12 +123,12 @@ class Persons(WalkingStudy):
 
     @property
     def total(self) -> float:
-        """Simulated seconds without falls."""
+        """Return the simulated time of all walks if none falls [s]."""
         sound = self.episodes * (len(SOUND_SPEEDS) + len(SLOPES_DEG))
         return len(self.persons) * self.seconds * (2 * self.drawn + sound)
 
     def ask(self, progress: OnProgress) -> Answer:
-        """Walk every person."""
+        """Walk every person through the drawn episodes, undisturbed and pushed, and on sound feet."""
         drawn: dict[str, dict[float, list[DrawnEpisode]]] = {}
         sound: list[dict[str, Any]] = []
         for name in self.persons:
@@ -153,7 +155,8 @@ class Persons(WalkingStudy):
         return Answer(text=f"{drawn_table(drawn)}\n\n{sound_table(sound)}\n\n{about}", files=files)
 
     def sound_walk(self, name: str, given: dict[str, Any], progress: OnProgress) -> dict[str, Any]:
-        """Return numbers of a person's walk on sound feet, the likeness to people's level walk at that speed."""
+        """Walk a person on sound feet with the settings `given`; return falls, walked speed, likeness to people's level
+        walk at the commanded speed, and both prices."""
         act, settings = policy_and_settings(name, {**given, "episode_seconds": self.seconds})
         metrics = measure(record(act, settings, name=name, progress=progress, **self.how)).metrics
         joints = metrics["joints"]
@@ -175,7 +178,10 @@ class Persons(WalkingStudy):
 
 
 def drawn_table(drawn: dict[str, dict[float, list[DrawnEpisode]]]) -> str:
-    """Return the Markdown table of falls by foot and of the held speed, a column for each person."""
+    """Return the Markdown table of falls by foot and of the speed's error, a column for each person.
+
+    `drawn` is person -> size of the pushes [N] -> episodes; all lines but that of the pushed falls are undisturbed.
+    """
     calm = {name: pushed[0.0] for name, pushed in drawn.items()}
     shaken = {name: pushed[PUSH_NEWTON] for name, pushed in drawn.items()}
     feet = sorted({episode.foot for episodes in calm.values() for episode in episodes})
@@ -191,7 +197,7 @@ def drawn_table(drawn: dict[str, dict[float, list[DrawnEpisode]]]) -> str:
 
 
 def _falls(episodes: Sequence[DrawnEpisode]) -> str:
-    """Return the falls of so many episodes in words."""
+    """Return the number of episodes that fell, as in "2 of 20"."""
     return f"{sum(episode.fell for episode in episodes)} of {len(episodes)}"
 
 
@@ -218,7 +224,7 @@ def sound_table(rows: Sequence[dict[str, Any]]) -> str:
 
 
 def _drawn_csv(drawn: dict[str, dict[float, list[DrawnEpisode]]]) -> str:
-    """Return all drawn episodes as CSV text."""
+    """Return the CSV with a line for each drawn episode; `drawn` as of `drawn_table`."""
     lines = [
         [name, push, episode.foot, episode.speed, episode.walked, int(episode.fell)]
         for name, pushed in drawn.items()

@@ -54,7 +54,7 @@ class Price(WalkingStudy):
 
     @property
     def total(self) -> float:
-        """Simulated seconds without falls."""
+        """Return the simulated time of all walks if none falls [s]."""
         return len(self.policies) * (1 + len(FACTORS)) * self.episodes * self.seconds
 
     def ask(self, progress: OnProgress) -> Answer:
@@ -119,13 +119,13 @@ def charges_of(name: str, bound: Mapping[float, Recording]) -> list[Row]:
 
 
 def price_table(prices: Sequence[Row], charges: Sequence[Row]) -> str:
-    """Return the Markdown table of rows of `prices_of` and of `charges_of`: prices, and what changes them by how
-    much."""
+    """Return the Markdown table of prices (rows of `prices_of`), their change with each tendon of `TENDONS`, and the
+    charge of K with each factor (rows of `charges_of`)."""
     priced = {(row["walk"], row["case"]): row for row in prices}
     walks = list(dict.fromkeys(row["walk"] for row in prices))
-    lines = [[AS_KNOWN, *(_shown(priced[walk, AS_KNOWN]) for walk in walks)]]
+    lines = [[AS_KNOWN, *(_price_cell(priced[walk, AS_KNOWN]) for walk in walks)]]
     for case in TENDONS:
-        lines.append([case, *(_change(priced[walk, case], priced[walk, AS_KNOWN]) for walk in walks)])
+        lines.append([case, *(_change_cell(priced[walk, case], priced[walk, AS_KNOWN]) for walk in walks)])
     factors = " / ".join(f"× {factor:g}" for factor in FACTORS)
     for number, words in CHARGES.items():
         cells = []
@@ -140,14 +140,14 @@ def price_table(prices: Sequence[Row], charges: Sequence[Row]) -> str:
     return f"{table(['', *walks], lines)}\n\n{note}"
 
 
-def _shown(row: Row) -> str:
-    """Return the cell of a walk: fibre work / effort, and in brackets the fibre work of ankle and toe, if known."""
+def _price_cell(row: Row) -> str:
+    """Return the cell of a walk: fibre work / effort, and in brackets the fibre work of ankle and toe unless None."""
     prices = " / ".join(text_of(row[price], ".2f") for price in TWO_PRICES)
     return prices if row["toe"] is None else f"{prices} ({row['ankle']:.2f}, {row['toe']:.2f})"
 
 
-def _change(row: Row, known: Row) -> str:
-    """Return the change of both prices."""
+def _change_cell(row: Row, unchanged: Row) -> str:
+    """Return the change of both prices from the row of the unchanged tendons, in percent; a dash without prices."""
     if row[TWO_PRICES[0]] is None:
         return MISSING
-    return " / ".join(f"{row[price] / known[price] - 1.0:+.0%}" for price in TWO_PRICES)
+    return " / ".join(f"{row[price] / unchanged[price] - 1.0:+.0%}" for price in TWO_PRICES)

@@ -23,9 +23,9 @@ class Prosthesis(SpringMap):
     """[N m/rad]."""
 
     def settings_of(self, case: float) -> Mapping[str, Any]:
-        """Return the mass."""
+        """Return the setting `mass` with the value `case` [kg]."""
         return {"mass": case}
 
     def feet_of(self, case: float, spring: float) -> Mapping[str, Any]:
-        """Return a passive right foot."""
+        """Return the setting of a passive right foot with an ankle of stiffness `spring` [N m/rad]."""
         return {"right_foot": {"kind": "passive", "ankle_stiffness": spring}}

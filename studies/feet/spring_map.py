@@ -55,11 +55,11 @@ class SpringMap(WalkingStudy):
     """Unit of the stiffness."""
 
     def settings_of(self, case: float) -> Mapping[str, Any]:
-        """Return settings of the body in a case."""
+        """Return the settings of the body in a case, whose value `case` is one of `CASES`."""
         raise NotImplementedError
 
     def feet_of(self, case: float, spring: float) -> Mapping[str, Any]:
-        """Return settings of the feet in a case, with a spring."""
+        """Return the settings of the feet in a case, with a spring of stiffness `spring` [`UNIT`]."""
         raise NotImplementedError
 
     @property
@@ -70,11 +70,11 @@ class SpringMap(WalkingStudy):
     @property
     def total(self) -> float:
         """Return the simulated time of all walks if none falls [s]."""
-        maps = len(self.walkers) * len(self._cases()) * len(self._asked())
+        maps = len(self.walkers) * len(self._cases()) * len(self._commanded_speeds())
         return maps * len(self.SPRINGS) * self.episodes * self.seconds
 
     def ask(self, progress: OnProgress) -> Answer:
-        """Walk with every spring."""
+        """Walk every policy with every spring in every case; find the best springs where all walk equally fast."""
         walks = self._walks(progress)
         even = at_walked_speeds(walks, ("policy", "case", "spring"), (0.9,) if self.quick else WALKED_SPEEDS)
         best = best_springs(even)
@@ -93,7 +93,7 @@ class SpringMap(WalkingStudy):
         for policy in self.walkers:
             for case in self._cases():
                 feet = [self.feet_of(case, spring) for spring in self.SPRINGS]
-                for speed in self._asked():
+                for speed in self._commanded_speeds():
                     of_springs = self._walk(kept, policy, {**self.settings_of(case), "speed": speed}, feet, progress)
                     for spring, numbers in zip(self.SPRINGS, of_springs, strict=True):
                         row = {"policy": policy, "case": case, "spring": spring, "speed_m_s": speed}
@@ -108,7 +108,8 @@ class SpringMap(WalkingStudy):
         feet: Sequence[Mapping[str, Any]],
         progress: OnProgress,
     ) -> list[dict[str, Any]]:
-        """Return the numbers of a walk on each of the `feet`, all on the same episodes."""
+        """Return `FOOT_NUMBERS` of a policy's walk on each of the `feet`, all in the same episodes; they come from
+        `kept` if it has them."""
 
         def make() -> dict[str, Any]:
             """Walk on all feet, and return their numbers under the key `walks`."""
@@ -120,13 +121,15 @@ class SpringMap(WalkingStudy):
         return kept.get([how, given, list(feet), FOOT_NUMBERS], make)["walks"]
 
     def _cases(self) -> Sequence[float]:
+        """Return the values of the cases to walk: the first alone with --quick."""
         return self.CASES[:1] if self.quick else self.CASES
 
-    def _asked(self) -> Sequence[float]:
+    def _commanded_speeds(self) -> Sequence[float]:
+        """Return the commanded speeds [m/s]."""
         return (0.8, 1.0) if self.quick else ASKED_SPEEDS
 
     def _text(self, walks: Sequence[Row], best: Sequence[Row]) -> str:
-        """Return the report."""
+        """Return the report from rows of `_walks` and of `best_springs`: a picture, a table and sentences."""
         groups = {"": self.policies, f", {self.beside} (not adapted)": self.walkers[len(self.policies) :]}
         parts = [
             "![Fibre work over the stiffness of the spring](map.png)",
@@ -177,8 +180,8 @@ def with_walked_speed(numbers: Mapping[str, Any]) -> dict[str, Any]:
 def best_springs(even: Sequence[Row]) -> list[dict[str, Any]]:
     """Return the best spring of each policy, case, walked speed and price, from rows of `at_walked_speeds`.
 
-    A row has the stiffness of the least price (`lowest`), that price, and how much more the dearest spring costs and
-    how much less than with the softest spring it is, as shares; None where fewer than two springs walk.
+    A row has the stiffness of the least price (`lowest`), that price, the share by which the dearest spring costs more
+    than it, and the share that it saves against the softest spring; None where fewer than two springs have a price.
     """
     rows = []
     for price in TWO_PRICES:
@@ -200,8 +203,8 @@ def best_springs(even: Sequence[Row]) -> list[dict[str, Any]]:
 def best_table(best: Sequence[Row], groups: Mapping[str, Sequence[str]], head: str) -> str:
     """Return the Markdown table of the springs of least fibre work: a line for each case and group of policies.
 
-    `groups` are policies by what follows the case in a line; `best` are rows of `best_springs`, `head` is the table's
-    first.
+    `best` are rows of `best_springs`, `groups` the policies of each group by its label behind the case, and `head` is
+    the heading of the first column.
     """
     of_fibre_work = [row for row in best if row["price"] == TWO_PRICES[0]]
     speeds = sorted({row["speed_m_s"] for row in best})
@@ -216,14 +219,15 @@ def best_table(best: Sequence[Row], groups: Mapping[str, Sequence[str]], head: s
 
 
 def _span(rows: Sequence[Row]) -> str:
-    """Return the least and largest best stiffness, and what the worst spring costs more, of rows of `best_springs`."""
+    """Return, as a cell, the best stiffness and the share by which the worst spring costs more: the least and largest
+    of `rows` of `best_springs`, a dash if one has no best spring."""
     if any(row["best"] is None for row in rows):
         return MISSING
     return f"{_ends((row['best'] for row in rows), '.3g')} ({_ends((row['worst_more'] for row in rows), '+.0%')})"
 
 
 def _ends(values: Iterable[float], pattern: str) -> str:
-    """Return the least and the largest value in words, one if they read alike."""
+    """Return the least and the largest value, as in "150 to 250"; one number if both read alike."""
     numbers = list(values)
     return " to ".join(dict.fromkeys(format(value, pattern) for value in (min(numbers), max(numbers))))
 

@@ -45,7 +45,8 @@ class Difference:
 
 
 def difference(prices: NDArray, others: NDArray) -> Difference:
-    """Return the difference of `prices` from the prices `others` of the same persons and episodes, (P, E) each."""
+    """Return the difference of a foot's `prices` from another foot's prices `others`, both (P, E), of the same P
+    persons in the same E episodes."""
     shares = prices / others - 1.0
     low, high = mean_interval(shares.ravel())
     mean = float(shares.mean())
@@ -64,8 +65,8 @@ def common_speed(asked: float, walked: Sequence[NDArray | None]) -> float:
     """Return the walked speed [m/s] nearest to the one `asked` for that lies between the two walks of every person on
     every foot; `asked` itself if there is none.
 
-    `walked` (F,) are of each foot the speeds (2, P, E) of P persons in E episodes of two walks [m/s]; None where
-    somebody fell.
+    `walked` has for each foot the speeds (2, P, E) [m/s] of two walks of P persons in E episodes; None for a foot on
+    which an episode fell.
     """
     of_persons = [speeds.mean(-1) for speeds in walked if speeds is not None]
     slowest = max((float(speeds.min(0).max()) for speeds in of_persons), default=asked)
@@ -74,10 +75,10 @@ def common_speed(asked: float, walked: Sequence[NDArray | None]) -> float:
 
 
 def price_at(speed: float, walked: NDArray, prices: NDArray) -> NDArray | None:
-    """Return the prices (P, E) at a walked `speed` [m/s], on the line through two walks of each person and episode.
+    """Return the prices (P, E) of P persons in E episodes at a walked `speed`, interpolated between two walks of each.
 
     Args:
-        speed: [m/s].
+        speed: walked speed [m/s].
         walked: (2, P, E) speeds of the two walks [m/s].
         prices: (2, P, E) prices of the two walks.
 
@@ -97,8 +98,8 @@ def verdict(price: str, names: Sequence[str], prices: Sequence[NDArray | None]) 
 
     Args:
         price: name of the price, such as "fibre work".
-        names: (F,) of the feet; the first one is that to compare with.
-        prices: (F,) of each foot the prices (P, E) of P persons in E episodes; None where one fell or was too slow.
+        names: names of the feet; the others are compared with the first.
+        prices: for each foot the prices (P, E) of P persons in E episodes; None where one fell or was too slow.
     """
     walked = {name: values for name, values in zip(names, prices, strict=True) if values is not None}
     if not walked:

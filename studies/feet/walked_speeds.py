@@ -39,15 +39,15 @@ def at_walked_speeds(
     Args:
         rows: walks with `keys`, `numbers`, `speed_m_s` (commanded), `walked_m_s` and `falls`.
         keys: columns that tell one case from another.
-        speeds: at which cases are compared.
-        numbers: columns of what is compared.
+        speeds: walked speeds at which cases are compared [m/s].
+        numbers: columns that are compared.
     """
     compared = []
     for speed in speeds:
         for case in dict.fromkeys(tuple(row[key] for key in keys) for row in rows):
             walks = [row for row in rows if tuple(row[key] for key in keys) == case]
             walks.sort(key=lambda row: row["speed_m_s"])
-            between = [known for pair in pairwise(walks) if (known := _numbers_at(speed, *pair, numbers))]
+            between = [found for pair in pairwise(walks) if (found := _numbers_at(speed, *pair, numbers))]
             line: dict[str, Any] = {**dict(zip(keys, case, strict=True)), "speed_m_s": speed, "walked_m_s": speed}
             line |= between[0] if between else dict.fromkeys(numbers)
             compared.append(line)
@@ -55,8 +55,8 @@ def at_walked_speeds(
 
 
 def _numbers_at(speed: float, slow: Row, fast: Row, numbers: Sequence[str]) -> dict[str, float] | None:
-    """Return the numbers at a walked `speed` [m/s], linear between two walks; None unless it lies between them, without
-    falls."""
+    """Return the columns `numbers` at a walked `speed` [m/s], linear between the walks `slow` and `fast`; None if it
+    does not lie between theirs, if one of them falls, or if one of the numbers is None."""
     unmeasured = any(walk[name] is None for walk in (slow, fast) for name in numbers)
     if slow["falls"] or fast["falls"] or unmeasured:
         return None
@@ -68,10 +68,10 @@ def _numbers_at(speed: float, slow: Row, fast: Row, numbers: Sequence[str]) -> d
 
 
 def lowest(walked: Mapping[float, float]) -> tuple[float, float]:
-    """Return the stiffness with the least price, and that price, from prices by rising stiffness.
+    """Return the stiffness with the least price, and that price; `walked` is stiffness, ascending -> price.
 
-    It is the lowest point of the parabola through the cheapest stiffness and its neighbours; the first or the last one
-    that was walked if that is the cheapest.
+    It is the lowest point of the parabola through the cheapest stiffness and its two neighbours, or the cheapest one
+    itself if it is the first or the last.
     """
     stiffness = list(walked)
     cheapest = min(walked, key=lambda k: walked[k])

@@ -26,7 +26,7 @@ WITHOUT_EFFECT = frozenset(
 
 
 def asked_of(study: Study) -> dict[str, Any]:
-    """Return the flags of a search that change its costs, as plain JSON values: `asked` of `generations`."""
+    """Return the flags of a search that change its costs, as JSON values: the argument `asked` of `generations`."""
     flags = {name: value for name, value in vars(study).items() if name not in WITHOUT_EFFECT}
     return {name: str(value) if isinstance(value, Path) else value for name, value in flags.items()}
 
@@ -38,7 +38,8 @@ def generations(
     file: Path | None = None,
     asked: Any = None,
 ) -> Iterator[tuple[int, list[NDArray], NDArray]]:
-    """Return an iterator that runs `count` generations: number of each, from 0, its candidates and their costs.
+    """Return an iterator that runs `count` generations, and yields for each its number, from 0, its candidates and
+    their costs (candidates,).
 
     Args:
         strategy: the search, not yet begun.
@@ -49,8 +50,8 @@ def generations(
 
     Raises `SpringfootError`, before any generation, if `file` is of another kind or belongs to another search.
     """
-    known = [] if file is None or not file.exists() else _kept_costs(file, strategy.popsize, asked)
-    return _run(strategy, count, costs_of, file, asked, known)
+    kept = [] if file is None or not file.exists() else _kept_costs(file, strategy.popsize, asked)
+    return _run_generations(strategy, count, costs_of, file, asked, kept)
 
 
 def _kept_costs(file: Path, candidates: int, asked: Any) -> list[NDArray]:
@@ -59,32 +60,33 @@ def _kept_costs(file: Path, candidates: int, asked: Any) -> list[NDArray]:
     table = read_object(file, "file of a search's costs")
     try:
         asked_before = table["asked"]
-        known = [_read_costs(costs, candidates) for costs in table["costs"]]
+        kept = [_read_costs(costs, candidates) for costs in table["costs"]]
     except (ValueError, TypeError, KeyError, OverflowError) as error:
         raise SpringfootError(f"{file} is no file of a search's costs: {error}") from None
     if json.dumps(asked_before, sort_keys=True) != json.dumps(asked, sort_keys=True):
         raise SpringfootError(f"{file} is of a search with other settings; choose another place")
-    return known
+    return kept
 
 
-def _run(
+def _run_generations(
     strategy: cma.CMAEvolutionStrategy,
     count: int,
     costs_of: Callable[[int, list[NDArray]], NDArray],
     file: Path | None,
     asked: Any,
-    known: list[NDArray],
+    kept: list[NDArray],
 ) -> Iterator[tuple[int, list[NDArray], NDArray]]:
-    """Run the generations of `generations`; the first have the costs `known`, and the others are added to `file`."""
+    """Run and yield the generations of `generations`; the first have the costs `kept`, those of the others are computed
+    and added to `file`."""
     for generation in range(count):
         vectors = [np.asarray(vector) for vector in strategy.ask()]
-        if generation < len(known):
-            costs = known[generation]
+        if generation < len(kept):
+            costs = kept[generation]
         else:
             costs = np.asarray(costs_of(generation, vectors), float)
-            known.append(costs)
+            kept.append(costs)
             if file is not None:
-                table = {"asked": asked, "costs": [of_generation.tolist() for of_generation in known]}
+                table = {"asked": asked, "costs": [of_generation.tolist() for of_generation in kept]}
                 write_atomically(file, (json.dumps(table) + "\n").encode())
         strategy.tell(vectors, costs.tolist())
         yield generation, vectors, costs

@@ -15,15 +15,15 @@ CONSTANTS = Path(str(resources.files("springfoot.envs.control") / "legs.json"))
 
 def read_constants(path: Path) -> dict[str, Any]:
     """Return the content of a file of leg constants: `constants` by name, and `found_by`, the commands."""
-    return _read(path, "constants", "leg constants")
+    return _read_table(path, "constants", "leg constants")
 
 
 def read_styles(path: Path) -> dict[str, Any]:
     """Return the content of a file of styles of walks, as `styles` and `found_by`; empty ones if there is no file."""
-    return _read(path, "styles", "styles of walks") if path.exists() else {"found_by": {}, "styles": {}}
+    return _read_table(path, "styles", "styles of walks") if path.exists() else {"found_by": {}, "styles": {}}
 
 
-def _read(path: Path, key: str, content: str) -> dict[str, Any]:
+def _read_table(path: Path, key: str, content: str) -> dict[str, Any]:
     """Return the object in a JSON file, which must have an object `key`; `found_by` is added if it is missing.
 
     Raises `SpringfootError`, which says that the file is not one of `content`, for any other file.

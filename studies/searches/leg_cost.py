@@ -1,10 +1,10 @@
 """Compute the cost of leg constants in the search of `leg_tuning`: the distance of their walks from people's and the
 plan.
 
-`misses` compares one walk with the fixed schedule: a vector of distances, each in units of its tolerance. `cost` ranks
-the candidates of a generation: the length of that vector, and a price for falls in walks from random starts, with and
-without pushes, and with foreign springs (constant stiffness, people's, the thesis's lines). `all_misses` is the vector
-that the refinement minimises by least squares.
+`misses` compares one walk with the candidate's schedule: a vector of distances, each in units of its tolerance. `cost`
+ranks the candidates of a generation: the length of that vector, and a cost of falls in walks from random starts, with
+and without pushes, and with foreign springs (constant stiffness, people's, the thesis's lines). `all_misses` is the
+vector that the refinement minimises by least squares.
 """
 
 from collections.abc import Sequence
@@ -175,7 +175,8 @@ def cost(
 
 
 def _walk_cost(series: dict[str, NDArray], biped: Biped, pays: Pays, impact: float) -> float | None:
-    """Return the cost of a walk without a fall; None if a leg takes fewer than two strides."""
+    """Return the cost of a walk without a fall, by `pays` (`cost`), from its `series`; None if a leg takes fewer than
+    two strides, or if the body does not advance."""
     tally = measured(series, biped)
     if tally is None:
         return None
@@ -186,15 +187,16 @@ def _walk_cost(series: dict[str, NDArray], biped: Biped, pays: Pays, impact: flo
 
 
 def _foreign_cost(walked: Walks, index: int, missing: float) -> float:
-    """Return the cost of walk `index` with foreign springs: of its fall, by its entry `missing` of `Walks.missing`, or
-    of its error of speed."""
+    """Return the cost of walk `index`, with foreign springs: that of its fall if `missing`, its entry of
+    `Walks.missing`, is above 0, else that of its error of speed."""
     if missing > 0:
         return missing * FALL_COST / len(FOREIGN)
     return abs(walked.speed(index) - walked.biped.settings.speed) / TOLERANCE["foreign_speed"]
 
 
 def all_misses(settings: BipedSettings, candidates: Sequence[LegConstants], threads: int) -> list[NDArray | None]:
-    """Return the misses of each candidate over the walks of `REFINED`, one vector; None for a candidate that falls."""
+    """Return for each candidate its misses in the walks of `REFINED`, each over the square root of their number, as one
+    vector; None for a candidate that falls or takes too few strides in one of them."""
     by_candidate: list[list[NDArray] | None] = [[] for _ in candidates]
     for start, seed in REFINED:
         refined = replace(settings, start=start, unevenness_m=UNEVENNESS)
@@ -219,7 +221,7 @@ def misses(tally: StrideTally, biped: Biped) -> NDArray:
     both = tally.both
     phase = PERCENT / 100
     mean = {curve: both.mean(column) * unit for curve, (column, unit) in CURVES.items()}
-    target_mean, target_work, band = _target(target)
+    target_mean, target_work, band = _target_numbers(target)
     # Curves: joints, forces and moments from the target, CoM and CoP from the plan.
     off: dict[str, Any] = {curve: values - target_mean[curve] for curve, values in mean.items()}
     course = planned_course(biped.plan)
@@ -228,7 +230,7 @@ def misses(tally: StrideTally, biped: Biped) -> NDArray:
     off["com_z"] = tally.com.mean("z") - course["plan_com"][:, 1]
     off["com_speed"] = tally.com.mean("vx") - planned_speed
     off["cop"] = np.nan_to_num(tally.cop.mean("x") - course["plan_zmp"])[:-1]  # at 100 % the plan is at the next foot
-    off["beyond_sd"] = _beyond(off["hip_moment"], band)
+    off["beyond_sd"] = _excess(off["hip_moment"], band)
     off = {name: values / np.sqrt(len(values)) for name, values in off.items()}  # so that the length is an RMS
     # Numbers: timing, peaks, work, and the properties of a good walk.
     late = phase > LATE_SWING
@@ -241,11 +243,11 @@ def misses(tally: StrideTally, biped: Biped) -> NDArray:
     target_features = astuple(force_features(target_mean["grf_vertical"], target_mean["grf_forward"]))
     # `ForceFeatures` begin with two peaks and the valley between them, then braking and forward peak.
     for name, part in (("vertical", slice(0, 3)), ("fore_aft", slice(3, 5))):
-        off[name] = _beyond(np.subtract(features[part], target_features[part]), ALLOWED[name])
+        off[name] = _excess(np.subtract(features[part], target_features[part]), ALLOWED[name])
     peak_moment = mean["ankle_moment"].max() - target_mean["ankle_moment"].max()
-    off["peak_moment"] = _beyond(peak_moment, ALLOWED["peak_moment"])
+    off["peak_moment"] = _excess(peak_moment, ALLOWED["peak_moment"])
     work = np.abs(np.mean(tally.joint_work, axis=0))  # (joint, positive and negative), mean over strides
-    off["work"] = _beyond(work[: len(target_work)] - target_work, ALLOWED["work"])
+    off["work"] = _excess(work[: len(target_work)] - target_work, ALLOWED["work"])
     ankle_r = np.corrcoef(mean["ankle"], target_mean["ankle"])[0, 1]
     off["ankle_r"] = max(LEAST_ANKLE_R - ankle_r, 0.0)
     off["effort"] = max(work[:, 0].sum() - MOST_WORK * target_work[:, 0].sum(), 0.0)
@@ -256,14 +258,14 @@ def misses(tally: StrideTally, biped: Biped) -> NDArray:
     return np.concatenate([np.ravel(value) / TOLERANCE[name] for name, value in off.items()])
 
 
-def _beyond(difference: NDArray, band: NDArray | float) -> NDArray:
-    """Return by how much a difference lies outside [-band, band], with its sign; 0 inside."""
+def _excess(difference: NDArray, band: NDArray | float) -> NDArray:
+    """Return the part of a difference that lies outside [-band, band], with its sign; 0 inside."""
     return np.sign(difference) * np.maximum(np.abs(difference) - band, 0.0)
 
 
 @lru_cache(maxsize=16)
-def _target(gait: HumanGait) -> tuple[dict[str, NDArray], NDArray, NDArray]:
-    """Return a target's mean curves (101,) by the names of `CURVES`, its work and its band of hip moments.
+def _target_numbers(gait: HumanGait) -> tuple[dict[str, NDArray], NDArray, NDArray]:
+    """Return a target's mean curves (101,) by the names of `CURVES`, its work and its band of hip moments, cached.
 
     The work (3, 2) [J/kg] is positive and negative, of hip, knee and ankle, from the mean power. The band (101,) is
     `BAND_SD` of the hip moment [N m/kg].

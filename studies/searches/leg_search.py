@@ -53,7 +53,10 @@ class Search:
         self.size = len(self.names)
 
     def constants(self, vector: NDArray) -> LegConstants:
-        """Return the constants at a vector (size,): start plus steps, or for gains start times e^(`GAIN_STEP` step)."""
+        """Return the constants at a vector (size,): start plus steps, for gains start times e^(`GAIN_STEP` step).
+
+        Constants in `LEAST` are not below their bound there; all are rounded to 5 decimals.
+        """
         values = {}
         first = 0  # entry of the next constant in the vector
         leads = dict(zip(LED, vector[-len(LED) :], strict=True))

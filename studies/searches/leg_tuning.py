@@ -245,12 +245,12 @@ class LegTuning(Study):
         nothing."""
         if self.quick:
             return
-        known = read_constants(self.constants)  # anew: another search may have written its constants
-        known["constants"][name] = asdict(constants)
-        known.setdefault("found_by", {})[name] = self.command
-        write_constants(self.constants, known)
+        content = read_constants(self.constants)  # anew: another search may have written its constants
+        content["constants"][name] = asdict(constants)
+        content.setdefault("found_by", {})[name] = self.command
+        write_constants(self.constants, content)
 
 
 def _generation_text(generation: int, best: float, median: float) -> str:
-    """Return the costs of a generation in words."""
+    """Return a generation's number, from 1, and its best and median cost, in words."""
     return f"generation {generation}: best {best:.2f}, median {median:.2f}"

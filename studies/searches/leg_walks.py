@@ -120,7 +120,7 @@ class Walks:
         return np.where(stood & (walked > 0.5), 0.0, 1.0 - 2.0 / 3.0 * np.clip(walked, 0.0, 1.0))
 
     def episode(self, index: int) -> dict[str, NDArray]:
-        """Return name -> (T, ...) series of walk `index`, without the ticks after its end."""
+        """Return name -> series (T, ...) of walk `index` over its T ticks, without those after its end."""
         return self.episodes.episode(index)
 
     def speed(self, index: int) -> float:
@@ -144,7 +144,8 @@ def measured(series: dict[str, NDArray], biped: Biped, settled: float = SETTLED)
 
 
 def _eased_rest_angles(settings: BipedSettings, candidates: Sequence[LegConstants], ease: float) -> NDArray:
-    """Return (C, SAMPLES, 2) rest angles of ankle and toe [rad], moved by the fraction `ease` to the planned ones."""
+    """Return the rest angles (C, SAMPLES, 2) [rad] of ankle and toe on `GRID`, for each of C candidates: the settings'
+    ones, moved by the fraction `ease` to the planned ones."""
     walk = reference_walk_at(settings, settings.speed, candidates)
     curves = [
         [foot_curves(variant, constants, walk)[0] for constants in candidates]

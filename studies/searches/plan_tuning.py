@@ -252,7 +252,7 @@ class PlanTuning(Study):
         )
 
     def _vector_at(self, candidate: NDArray, speed: float) -> NDArray:
-        """Return the vector of the style at `speed` [m/s] of a candidate, which holds those of `found_speeds`."""
+        """Return the vector of a candidate's style at `speed` [m/s], linear between its vectors at `found_speeds`."""
         ends = candidate.reshape(len(self.found_speeds), -1)
         if len(ends) == 1:
             return ends[0]
@@ -260,17 +260,17 @@ class PlanTuning(Study):
         return ends[0] + (speed - slowest) / (fastest - slowest) * (ends[1] - ends[0])
 
     def _mean_price(self, body: Body, candidate: NDArray) -> float:
-        """Return the mean cost of a candidate over the speeds (see `price`)."""
+        """Return the mean cost (`price`) of a candidate's plans over the flag `speeds`."""
         return float(np.mean([self._price(body, speed, self._vector_at(candidate, speed))[0] for speed in self.speeds]))
 
     def _price(self, body: Body, speed: float, vector: NDArray) -> tuple[float, WalkPlan | None, Effort | None]:
-        """Return cost, plan and effort at a vector, by the flags (see `price`)."""
+        """Return cost, plan and effort of `price` at a vector, with the weights and muscles of the flags."""
         muscle = Muscle(tissue=self.tissue, tendon=self.tendon, toe_tendon=self.toe_tendon)
         return price(body, speed, vector, self.weights, muscle)
 
     def _write_styles(self, styles: dict[float, WalkStyle]) -> None:
-        """Write the styles that were found, and the command that found them, into the file of styles in place of those
-        of these speeds; with --quick nothing."""
+        """Write `styles` by speed [m/s], and the command that found them, into the file of styles; those at other
+        speeds stay. With --quick write nothing."""
         if self.quick:
             return
         table = read_styles(self.styles)

@@ -101,7 +101,7 @@ class Predict(WalkingStudy):
 
     @property
     def folder(self) -> Path:
-        """Return the folder of the stages; with --quick another one."""
+        """Return the folder in which the stages keep their results: `runs`, with --quick `RUNS-quick` beside it."""
         return self.runs.with_name(f"{self.runs.name}-quick") if self.quick else self.runs
 
     def ask(self, progress: OnProgress) -> Answer:
@@ -182,7 +182,10 @@ class Predict(WalkingStudy):
         return Answer(text=f"{text}\n\n{times}")
 
     def _train(self, settings: BipedSettings, out: Path) -> None:
-        """Train a policy in the folder `out`, or the rest of its training."""
+        """Train a policy in the folder `out`, or go on with its training there; do nothing if it is finished.
+
+        Raises `SpringfootError` if other settings were trained there, and `KeyboardInterrupt` if the user stops it.
+        """
         from springfoot.agents import resume, train  # torch takes seconds, which --help need not wait for
 
         preset = PRESETS["predict"]

@@ -51,7 +51,8 @@ PREDICTION = (
 
 
 def walk_numbers(metrics: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the numbers of `PREDICTION` from the metrics of a walk."""
+    """Return the metrics of a walk with the further numbers of `PREDICTION`, among them the distance of double support
+    from people's [s]."""
     values = with_derived(dict(metrics))
     settings = BipedSettings(speed=metrics["environment"]["speed"], height=metrics["environment"]["height"])
     support = values["double_support_s"]
@@ -120,12 +121,12 @@ def _positive_work(gait: HumanGait) -> float:
 def numbers_of(gait: HumanGait, human: HumanGait) -> dict[str, Any]:
     """Return the numbers of `PREDICTION` but falls and speed, for the mean curves of `gait` against those of `human`.
 
-    They are nested as metrics of a walk are.
+    They are nested as metrics of a walk are. `human` is people's gait.
     """
     phase = PERCENT / 100
 
     def pair(name: str) -> tuple[Any, Any]:
-        """Return the curve of that name (101,) in both gaits."""
+        """Return the mean curve `name` (101,) of `gait` and of `human`."""
         return gait.mean(name, phase), human.mean(name, phase)
 
     vertical = pair("grf_vertical")

@@ -66,7 +66,7 @@ class Agreement:
 
     @property
     def variation(self) -> NDArray:
-        """Return (101,) the coefficient of variation of K over the policies, SD with n - 1."""
+        """Return (101,) the coefficient of variation of K over the policies: SD (n - 1) / mean."""
         return self.stiffness.std(axis=0, ddof=1) / self.stiffness.mean(axis=0)
 
     @property
@@ -226,7 +226,7 @@ class SeedAgreement(WalkingStudy):
     """Two or more policies of evaluate.py: run folders, files, names."""
 
     def check(self) -> None:
-        """Refuse fewer than two policies as well."""
+        """Refuse counts and lengths out of range, and fewer than two policies."""
         super().check()
         _require_two(len(self.policies))
 
@@ -256,6 +256,6 @@ class SeedAgreement(WalkingStudy):
         return Answer(text=text, files=files)
 
     def _walk(self, name: str, progress: OnProgress) -> Gait:
-        """Return the measured walk of the policy of that name."""
+        """Record the walk of the policy `name`; return its measurements."""
         policy, settings = policy_and_settings(name, {"episode_seconds": self.seconds}, self.seed, self.threads)
         return measure(record(policy, settings, name=policy_label(name), progress=progress, **self.how))

@@ -63,7 +63,8 @@ class MeanSprings:
 
 
 def mean_springs(recording: Recording) -> MeanSprings:
-    """Return the mean springs of a recorded gait, without the first `WARM_UP` seconds of each episode.
+    """Return the mean springs of a recorded gait, without the first `WARM_UP` seconds of each episode; in segments
+    without a sample they are interpolated.
 
     Raises `SpringfootError` for a gait without samples in half of the segments or more.
     """
@@ -78,7 +79,8 @@ def mean_springs(recording: Recording) -> MeanSprings:
         raise SpringfootError(f"{recording.policy} walks no strides after {WARM_UP:g} s whose springs could be rebuilt")
 
     def mean(name: str) -> NDArray:
-        """Return the mean of a series over the samples of each segment, (PHASE_SEGMENTS, 2)."""
+        """Return the mean of a series in each segment, (PHASE_SEGMENTS, (ankle, toe)), interpolated where there is no
+        sample."""
         values = recording.series[name][:, begin:]  # of all four joints, but `stiffness` of ankle and toe alone
         values = (values if name == "stiffness" else values[..., FEET]).reshape(-1, 2)[valid].astype(float)
         totals = [np.bincount(segment, values[:, joint], PHASE_SEGMENTS)[seen] for joint in range(2)]
@@ -100,8 +102,8 @@ def rebuilt(springs: MeanSprings, stiffness: NDArray) -> StiffnessSchedule:
 
 
 def stiffness_named(name: str, springs: MeanSprings) -> NDArray:
-    """Return K of ankle and toe (PHASE_SEGMENTS, 2) [N m/rad] for a name as in `STIFFNESSES`, with any positive number
-    after the colon; raise `SpringfootError` for another name."""
+    """Return K (PHASE_SEGMENTS, (ankle, toe)) [N m/rad] for a name as in `STIFFNESSES`, with any positive number after
+    the colon; raise `SpringfootError` for another name. `springs` are those of the recorded gait."""
     kind, _, text = name.partition(":")  # "flat:150"
     try:
         number = float(text) if text else nan
@@ -264,7 +266,7 @@ class AnyStiffness(WalkingStudy):
         return (1 + len(self.stiffness)) * conditions * self.episodes * self.seconds
 
     def ask(self, progress: OnProgress) -> Answer:
-        """Walk with every stiffness."""
+        """Walk the policy's gait with every stiffness, undisturbed, pushed and on uneven ground."""
         disturbances = {
             f"±{self.push_newton:g} N": {"push_newton": self.push_newton},
             f"±{100 * self.unevenness_m:g} cm": {"unevenness_m": self.unevenness_m},

@@ -20,7 +20,7 @@ import tyro
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from springfoot.agents.policies import has_feedback
+from springfoot.agents.policies import PolicyFunction, has_feedback
 from springfoot.envs.settings import BipedSettings, reference_gait
 from springfoot.errors import SpringfootError, require_count, require_number
 from springfoot.evaluation.recording import WARM_UP, policy_and_settings
@@ -64,7 +64,9 @@ INFLUENCE_CONDITIONS = (
 """Conditions under which stiffness changes."""
 
 
-def walk_under(condition: str, policy: str, change: float, unevenness: float, seed: int = 0) -> tuple[Any, Any, float]:
+def walk_under(
+    condition: str, policy: str, change: float, unevenness: float, seed: int = 0
+) -> tuple[PolicyFunction, BipedSettings, float]:
     """Return policy, settings and change of K (a fraction of it) for one of `INFLUENCE_CONDITIONS`.
 
     `policy`, `change` and `unevenness` [m] are those of the condition "as it is". Policies without feedback decide at
@@ -119,10 +121,10 @@ class Influence(Study):
             require_count(name, len(count) if name == "conditions" else count, least)
         require_number("change_percent", self.change_percent, -90.0, 900.0, "%")
         for condition in self.conditions:
-            self._under(condition)
+            self._condition_walk(condition)
 
-    def _under(self, condition: str) -> tuple[Any, Any, float]:
-        """Return policy, settings and change of K under a condition, by the flags."""
+    def _condition_walk(self, condition: str) -> tuple[PolicyFunction, BipedSettings, float]:
+        """Return policy, settings and change of K of `walk_under` for a condition, by the flags."""
         return walk_under(condition, self.policy, self.change_percent / 100, self.unevenness_m, self.seed)
 
     @property
@@ -137,7 +139,7 @@ class Influence(Study):
         seeds = range(self.seed, self.seed + self.seeds)
         responses = {}
         for condition in self.conditions:
-            policy, settings, change = self._under(condition)
+            policy, settings, change = self._condition_walk(condition)
             how = {"strides": self.strides, "threads": self.threads, "progress": progress}
             responses[condition] = summarise(paired_walks(policy, settings, change, seeds, **how), change)
         picture = f"![Stiffness, torque, CoM acceleration and movement]({FIGURE})"
@@ -179,15 +181,15 @@ def _cell(cell: int) -> str:
 
 
 def _number(response: Response, key: Key, cell: int, pattern: str, unit: float = 1.0, interval: bool = True) -> str:
-    """Return the mean of a quantity in a cell, times `unit`, as in "+1.2 [+0.9, +1.5]"; the mean alone without
-    `interval`."""
+    """Return mean and interval of the quantity `key` in one of `CELLS`, times `unit`, as in "+1.2 [+0.9, +1.5]"; the
+    mean alone without `interval`, a dash for NaN."""
     values = (response.mean[key][cell], *response.interval[key][cell])
-    mean, low, high = (_signed(unit * value, pattern) for value in values)
+    mean, low, high = (_signed_text(unit * value, pattern) for value in values)
     return f"{mean} [{low}, {high}]" if interval and mean != MISSING else mean
 
 
-def _signed(value: float, pattern: str) -> str:
-    """Return a number of a table with its sign; none for 0, a dash for NaN."""
+def _signed_text(value: float, pattern: str) -> str:
+    """Return a number by the format `pattern`, which gives it a sign; 0 has no sign, and NaN is a dash."""
     text = format(value, pattern)
     return MISSING if not isfinite(value) else text.lstrip("+-") if float(text) == 0 else text
 
@@ -306,11 +308,11 @@ def save_influence_figure(path: Path, responses: Mapping[str, Response]) -> None
         for ax in axes[1:5]:
             ax.sharey(axes[0])
             ax.tick_params(labelleft=False, left=False)
-        _bars(axes[0], first, TORQUE, "Δ torque (N·m)", "1  Torque")
-        _bars(axes[1], first, ACCELERATION, "Δ CoM acceleration,\nforward (m/s²)", "2  Acceleration")
-        _bars(axes[2], first, UP, "Δ CoM acceleration,\nup (m/s²)", "")
-        _bars(axes[3], first, VELOCITY, "Δ CoM velocity as the\nphase ends (mm/s)", "3  Movement", 1e3)
-        _speeds(axes[4], first)
+        _draw_bars(axes[0], first, TORQUE, "Δ torque (N·m)", "1  Torque")
+        _draw_bars(axes[1], first, ACCELERATION, "Δ CoM acceleration,\nforward (m/s²)", "2  Acceleration")
+        _draw_bars(axes[2], first, UP, "Δ CoM acceleration,\nup (m/s²)", "")
+        _draw_bars(axes[3], first, VELOCITY, "Δ CoM velocity as the\nphase ends (mm/s)", "3  Movement", 1e3)
+        _draw_speeds(axes[4], first)
         names = [f"{100 * PHASES[p][0]:.0f}–{100 * PHASES[p][1]:.0f} %  {p}" for _, p in CELLS]
         axes[0].set_yticks(ROWS, names)
         beside = axes[0].get_yaxis_transform()
@@ -324,8 +326,8 @@ def save_influence_figure(path: Path, responses: Mapping[str, Response]) -> None
         figure.savefig(path, dpi=130, **PNG)
 
 
-def _bars(ax: Axes, response: Response, key: Key, label: str, title: str, unit: float = 1.0) -> None:
-    """Draw a quantity, times `unit`, as a bar with its interval for each joint and phase."""
+def _draw_bars(ax: Axes, response: Response, key: Key, label: str, title: str, unit: float = 1.0) -> None:
+    """Draw the quantity `key`, times `unit`: for each joint and phase a bar with its interval."""
     mean = unit * response.mean[key]
     ax.barh(
         ROWS,
@@ -338,8 +340,8 @@ def _bars(ax: Axes, response: Response, key: Key, label: str, title: str, unit: 
     ax.set(xlabel=label, title=title)
 
 
-def _speeds(ax: Axes, response: Response) -> None:
-    """Draw the change of speed in the strides of `DRAWN_STRIDES`, by joint and phase."""
+def _draw_speeds(ax: Axes, response: Response) -> None:
+    """Draw, for each joint and phase changed in every stride, the change of speed in the strides of `DRAWN_STRIDES`."""
     for label, (time, color, shift) in DRAWN_STRIDES.items():
         key: Key = ("every stride", "speed_m_s", time)
         ax.errorbar(
@@ -357,7 +359,8 @@ def _speeds(ax: Axes, response: Response) -> None:
 
 
 def _whiskers(response: Response, key: Key, unit: float) -> np.ndarray:
-    """Return (2, C) the distances from the mean to the ends of its interval, times `unit`."""
+    """Return (2, len(CELLS)) the distances from the mean of the quantity `key` to the low and the high end of its
+    interval, times `unit`."""
     return np.abs(unit * (response.interval[key].T - response.mean[key]))
 
 

@@ -59,7 +59,7 @@ class Landscape(PersonsStudy):
         return 2.0 * len(self.persons) * len(self._cells()) * self.episodes * self.seconds
 
     def ask(self, progress: OnProgress) -> Answer:
-        """Walk every person in every cell."""
+        """Walk every person in every cell (ankle, toe, commanded speed); find the cheapest at equal walked speed."""
         kept = Kept(self.keep)
         cells = {(ankle, toe): f"constant:{ankle:g},{toe:g}" for ankle, toe, _ in self._cells()}
         speeds = dict.fromkeys(speed for _, _, speed in self._cells())
@@ -85,35 +85,36 @@ class Landscape(PersonsStudy):
     def _walk(
         self, kept: Kept, person: str, cells: Sequence[str], speed: float, progress: OnProgress
     ) -> list[dict[str, Any]]:
-        """Return the numbers of several cells at a commanded speed; `cells` are policies that keep their stiffness."""
+        """Return `_cell_numbers` of a person's walks at a commanded `speed` [m/s] with each of `cells`, which are
+        baselines `constant:ANKLE,TOE`; those in `kept` are not walked again."""
         given = {"person": str(find_policy(person)), "speed": speed, "episode_seconds": self.seconds}
 
-        def walked(chosen: Sequence[str], push: float) -> list[dict[str, Any]]:
-            """Return the metrics of the walks of the `chosen` cells, side by side, pushed by so much."""
-            found = {name: policy_and_settings(name, {**given, "push_newton": push}) for name in chosen}
+        def metrics_of(baselines: Sequence[str], push: float) -> list[dict[str, Any]]:
+            """Return the metrics of walks with several of `cells`, side by side, under pushes of `push` [N]."""
+            found = {name: policy_and_settings(name, {**given, "push_newton": push}) for name in baselines}
             acts = {name: act for name, (act, _) in found.items()}
-            _, settings = found[chosen[0]]
+            _, settings = found[baselines[0]]
             recordings = record_policies(acts, settings, progress=progress, **self.how)
             return [measure(recording).metrics for recording in recordings]
 
         def make(missing: list[int]) -> list[dict[str, Any]]:
-            """Walk undisturbed and pushed; return the numbers."""
-            chosen = [cells[index] for index in missing]
-            pairs = zip(walked(chosen, 0.0), walked(chosen, self.push_newton), strict=True)
-            return [_numbers(metrics, pushed) for metrics, pushed in pairs]
+            """Walk with the cells of the indices `missing`, undisturbed and pushed; return their numbers."""
+            baselines = [cells[index] for index in missing]
+            pairs = zip(metrics_of(baselines, 0.0), metrics_of(baselines, self.push_newton), strict=True)
+            return [_cell_numbers(metrics, pushed) for metrics, pushed in pairs]
 
         return kept.get_all([[self.walked, self.push_newton, cell, given] for cell in cells], make)
 
     def _cells(self) -> Sequence[tuple[float, float, float]]:
-        """Return ankle, toe and commanded speed of each cell."""
+        """Return the stiffness of ankles and of toes [N m/rad] and the commanded speed [m/s] of each cell."""
         if self.quick:
             return list(product(ANKLES[1::2], TOES[1:4:2], (0.8, 1.0)))
         return list(product(ANKLES, TOES, ASKED_SPEEDS))
 
     def _text(self, walks: Sequence[Row], least: Sequence[Row]) -> str:
-        """Return the report."""
+        """Return the report: picture, table of the cheapest cells, and sentences on falls and on the speed."""
         columns = {"undisturbed": "falls", f"pushed by ±{self.push_newton:g} N": "falls_pushed"}
-        falls = ", ".join(f"{_fallen(walks, column)} {name}" for name, column in columns.items())
+        falls = ", ".join(f"{_count_with_falls(walks, column)} {name}" for name, column in columns.items())
         ways = [
             f"The faster walk has its least {price_name} at a stiffer {joint} in {direction(least, column, price)}."
             for price, price_name in zip(TWO_PRICES, ("fibre work", "effort"), strict=True)
@@ -130,8 +131,9 @@ class Landscape(PersonsStudy):
         )
 
 
-def _numbers(metrics: Mapping[str, Any], pushed: Mapping[str, Any]) -> dict[str, float | None]:
-    """Return the numbers of a cell from the metrics of its walks, undisturbed and pushed."""
+def _cell_numbers(metrics: Mapping[str, Any], pushed: Mapping[str, Any]) -> dict[str, float | None]:
+    """Return falls, walked speed, prices and RMSE of the joints from the metrics of a cell's undisturbed walk, and the
+    falls of its `pushed` one."""
     numbers = price_numbers(metrics)
     return {
         "falls": numbers["falls"],
@@ -141,16 +143,16 @@ def _numbers(metrics: Mapping[str, Any], pushed: Mapping[str, Any]) -> dict[str,
     }
 
 
-def _fallen(walks: Sequence[Row], column: str) -> int:
-    """Return the number of cells in which an episode falls."""
+def _count_with_falls(walks: Sequence[Row], column: str) -> int:
+    """Return the number of rows with a fall in the `column` of falls, undisturbed or pushed."""
     return sum(row[column] > 0 for row in walks)
 
 
 def cheapest(even: Sequence[Row]) -> list[dict[str, Any]]:
     """Return the cell of the least price of each person, walked speed and price, from rows of `at_walked_speeds`.
 
-    A row has its ankle's and toe's stiffness, the price, and of both the least and the greatest stiffness of the cells
-    that cost at most `NOT_DEARER` more; None where no cell walks.
+    A row has that cell's stiffness of ankle and toe, its price, and the range of each stiffness over the cells that
+    cost at most `NOT_DEARER` more; None where no cell has a price.
     """
     rows = []
     for price in TWO_PRICES:
@@ -182,7 +184,7 @@ def least_table(least: Sequence[Row]) -> str:
 
 
 def _cell(row: Row) -> str:
-    """Return the two stiffnesses of the least price, with the ranges near it, in words."""
+    """Return ankle's and toe's stiffness of a row of `cheapest`, each with its range in brackets; a dash if None."""
     if row["least"] is None:
         return MISSING
     return ", ".join(f"{row[name]:g} ({row[f'{name}_from']:g} to {row[f'{name}_to']:g})" for name in BOTH_STIFFNESSES)
@@ -227,7 +229,7 @@ def draw(path: Path, walks: Sequence[Row], even: Sequence[Row]) -> None:
                     ]
                     if None not in here:
                         prices[row, column] = np.mean(here)
-                _panel(ax, prices, ankles, toes, fallen)
+                _draw_panel(ax, prices, ankles, toes, fallen)
                 ax.set_title(f"{label}, walking {speed:g} m/s")
         for ax in grid[-1]:
             ax.set_xlabel("ankle, N·m/rad")
@@ -236,17 +238,18 @@ def draw(path: Path, walks: Sequence[Row], even: Sequence[Row]) -> None:
         figure.savefig(path, dpi=110, facecolor="white", metadata={"Software": "springfoot"})
 
 
-def _panel(
+def _draw_panel(
     ax: Axes, prices: Any, ankles: Sequence[float], toes: Sequence[float], fallen: set[tuple[float, ...]]
 ) -> None:
-    """Draw one panel: prices (toes, ankles), their values inside, the least one bold."""
+    """Draw one panel: prices (toes, ankles) as colours with their values, the least one bold; cells without a price
+    have × if an episode falls (`fallen`, (ankle, toe) of cells), else a dash."""
     ax.imshow(prices, origin="lower", aspect="auto", cmap="viridis_r")
     for (row, toe), (column, ankle) in product(enumerate(toes), enumerate(ankles)):
         value = prices[row, column]
-        known = np.isfinite(value)
-        text = f"{value:.2f}" if known else "×" if (ankle, toe) in fallen else "–"
-        bold = known and value == np.nanmin(prices)
-        dark = known and value > np.mean([np.nanmin(prices), np.nanmax(prices)])
+        has_price = np.isfinite(value)
+        text = f"{value:.2f}" if has_price else "×" if (ankle, toe) in fallen else "–"
+        bold = has_price and value == np.nanmin(prices)
+        dark = has_price and value > np.mean([np.nanmin(prices), np.nanmax(prices)])
         weight, color = "bold" if bold else "normal", "white" if dark else "black"
         ax.text(column, row, text, ha="center", va="center", fontsize=7, fontweight=weight, color=color)
     ax.set_xticks(range(len(ankles)), [f"{k:g}" for k in ankles])

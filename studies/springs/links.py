@@ -1,6 +1,6 @@
 """Compare two classes of stiffness, one within the other, on the same episodes."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
@@ -61,11 +61,17 @@ class Link:
     """p of McNemar's exact test that both fall equally often."""
 
 
-def compared(aim: str, names: tuple[str, str], condition: str, inner: Any, outer: Any) -> Link:
-    """Return the link of two classes called `names` from their episodes.
+def compared(
+    aim: str,
+    names: tuple[str, str],
+    condition: str,
+    inner: Mapping[str, Sequence[Any]],
+    outer: Mapping[str, Sequence[Any]],
+) -> Link:
+    """Return the comparison of two classes, whose `names` are (inner, outer), from their walks of the same episodes.
 
-    `inner` and `outer` have, by name, lists of equal length: `fell`, `speed_m_s` and the number of each `Aim`, None
-    where nothing could be measured.
+    `inner` and `outer` have lists with an entry for each episode: `fell`, `speed_m_s`, and by each `Aim` its number,
+    None where it could not be measured. Numbers are of the episodes that both classes walk to the end.
     """
     both = [
         index
@@ -73,8 +79,8 @@ def compared(aim: str, names: tuple[str, str], condition: str, inner: Any, outer
         if None not in pair and not (inner["fell"][index] or outer["fell"][index])
     ]
 
-    def values(walks: Any, name: str) -> NDArray:
-        """Return the numbers of the episodes in which both walk to the end, (n,)."""
+    def values(walks: Mapping[str, Sequence[Any]], name: str) -> NDArray:
+        """Return the numbers `name` (n,) of the n episodes in which both classes walk to the end."""
         return np.array([walks[name][index] for index in both], float)
 
     numbers: dict[str, float | None] = dict.fromkeys(
@@ -92,9 +98,9 @@ def compared(aim: str, names: tuple[str, str], condition: str, inner: Any, outer
         }
     falls: dict[str, Any] = {}
     fell = {"inner": np.array(inner["fell"], bool), "outer": np.array(outer["fell"], bool)}
-    for name, those in fell.items():
-        low, high = share_interval(int(those.sum()), len(those))
-        falls |= {f"{name}_falls": int(those.sum()), f"{name}_falls_low": low, f"{name}_falls_high": high}
+    for name, of_class in fell.items():
+        low, high = share_interval(int(of_class.sum()), len(of_class))
+        falls |= {f"{name}_falls": int(of_class.sum()), f"{name}_falls_low": low, f"{name}_falls_high": high}
     return Link(
         aim=aim,
         inner=names[0],
@@ -108,7 +114,8 @@ def compared(aim: str, names: tuple[str, str], condition: str, inner: Any, outer
 
 
 def fewest_falls(episodes: int) -> int | None:
-    """Return the fewest falls of one class alone that McNemar's test shows in so many episodes; None if none do."""
+    """Return the least number of `episodes` that McNemar's test shows as a difference if one class alone falls in them;
+    None if it shows none."""
     for alone in range(1, episodes + 1):
         fell = np.arange(episodes) < alone
         if paired_p(fell, np.zeros(episodes, bool)) < 1.0 - LEVEL:
@@ -117,8 +124,8 @@ def fewest_falls(episodes: int) -> int | None:
 
 
 def verdict(links: Sequence[Link]) -> str:
-    """Return, in sentences, at which links the outer class is better undisturbed, aim by aim, and at which falls
-    differ."""
+    """Return sentences: for each aim the links at which the outer class is better undisturbed, and the links at which
+    falls differ."""
     sentences = []
     for aim in dict.fromkeys(link.aim for link in links):
         here = [link for link in links if link.aim == aim and link.condition == UNDISTURBED_WALK]

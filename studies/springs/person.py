@@ -90,15 +90,15 @@ class Person(MotionFiles):
 
 
 class _Sheet:
-    """The report on one person."""
+    """The report on one person, by the flags of the command."""
 
-    def __init__(self, asked: Person, measured: MeasuredPerson):
-        self._asked = asked
+    def __init__(self, flags: Person, measured: MeasuredPerson):
+        self._flags = flags
         self._measured = measured
         self._speed = measured.gait.speed or USUAL_SPEED
         self._mass = measured.mass
-        self._norm: HumanGait = human_gait(self._speed, asked.height)
-        self._gait: HumanGait = measured.gait.gait(self._speed, asked.height)
+        self._norm: HumanGait = human_gait(self._speed, flags.height)
+        self._gait: HumanGait = measured.gait.gait(self._speed, flags.height)
         if not any("ankle" in leg.curves for leg in measured.legs.values()):
             raise SpringfootError(
                 f"{measured.gait.name}: no ankle angle, such as {FILE_CURVES['ankle']} or ankle_angle_r; "
@@ -107,16 +107,16 @@ class _Sheet:
 
     @property
     def _unit(self) -> str:
-        """Return the unit of a stiffness."""
+        """Return the unit of a stiffness: per kg if the mass is unknown."""
         return "N·m/rad" if self._mass else "N·m/(rad·kg)"
 
     @property
     def _body(self) -> Body:
-        """Return the body that walks the schedule."""
-        return Body(height=self._asked.height, mass=self._mass or REFERENCE_MASS)
+        """Return the body that walks the schedule; `REFERENCE_MASS` if the person's mass is unknown."""
+        return Body(height=self._flags.height, mass=self._mass or REFERENCE_MASS)
 
     def answer(self) -> Answer:
-        """Return text and files."""
+        """Return the report and its files; without a schedule where none can be made."""
         files: dict[str, Any] = {
             "quasi_stiffness.csv": self._stiffness_csv(),
             "curves.csv": self._curves_csv(),
@@ -124,18 +124,21 @@ class _Sheet:
         notes = list(self._measured.notes)
         try:
             springs = self._schedule()
-            files |= {"schedule.csv": self._schedule_csv(springs), "finite_states.json": self._states(springs)}
+            files |= {"schedule.csv": self._schedule_csv(springs), "finite_states.json": self._finite_states(springs)}
         except SpringfootError as error:
             notes.append(f"No schedule: {error}.")
-        files["curves.png"] = partial(draw_curves, sheet=self._drawn(), norm=self._norm)
-        files["torque_angle.png"] = partial(draw_loops, sheet=self._drawn(), norm=self._norm, starts=self._starts())
+        files["curves.png"] = partial(draw_curves, sheet=self._mean_curves(), norm=self._norm)
+        files["torque_angle.png"] = partial(
+            draw_loops, sheet=self._mean_curves(), norm=self._norm, starts=self._phase_bounds()
+        )
         return Answer(text=self._text(notes, "schedule.csv" in files), files=files)
 
     # Quasi-stiffness -----------------------------------------------------------------------------------------
 
     @cached_property
     def rows(self) -> list[PhaseStiffness]:
-        """Return the quasi-stiffness of each joint, leg and phase, those of people behind."""
+        """Return the quasi-stiffness of each joint, leg and phase of stance, from the strides on a force plate; behind
+        each joint's legs that of people. Computed once."""
         rows = []
         factor = self._mass or 1.0
         for joint in SPRINGS:
@@ -157,7 +160,7 @@ class _Sheet:
 
     @property
     def _sides(self) -> list[str]:
-        """Return the columns of the table."""
+        """Return the heads of the table's columns: the sides that were read, and the norm."""
         return [*(side or "both" for side in self._measured.legs), "norm"]
 
     def _table(self) -> str:
@@ -168,8 +171,8 @@ class _Sheet:
         for joint, name in names:
             cells = []
             for side in self._sides:
-                of = [row for row in self.rows if (row.joint, row.phase.name, row.side) == (joint, name, side)]
-                cells.append(_cell(of[0], pattern) if of else MISSING)
+                rows = [row for row in self.rows if (row.joint, row.phase.name, row.side) == (joint, name, side)]
+                cells.append(_cell(rows[0], pattern) if rows else MISSING)
             lines.append([f"{joint}, {name}", *cells])
         return table([f"quasi-stiffness, {self._unit}", *self._sides], lines)
 
@@ -186,15 +189,15 @@ class _Sheet:
 
     # Curves --------------------------------------------------------------------------------------------------
 
-    def _drawn(self) -> dict[str, dict[str, NDArray]]:
-        """Return side -> curve -> its mean (101,)."""
+    def _mean_curves(self) -> dict[str, dict[str, NDArray]]:
+        """Return side -> curve -> its mean (101,) over the strides that count; curves without one are left out."""
         return {
-            side or "both": {name: leg.counted(name).mean(axis=0) for name in FILE_CURVES if _has(leg, name)}
+            side or "both": {name: leg.counted(name).mean(axis=0) for name in FILE_CURVES if _has_strides(leg, name)}
             for side, leg in self._measured.legs.items()
         }
 
-    def _starts(self) -> dict[tuple[str, str], list[float]]:
-        """Return joint and side -> stride phases at which the phases of stance begin, and the end of the last."""
+    def _phase_bounds(self) -> dict[tuple[str, str], list[float]]:
+        """Return (joint, side) -> stride phases at which the phases of stance begin, and the end of the last."""
         starts: dict[tuple[str, str], list[float]] = {}
         for row in self.rows:
             starts.setdefault((row.joint, row.side), [row.phase.start]).append(row.phase.end)
@@ -220,7 +223,7 @@ class _Sheet:
             if name in gait.sd:
                 columns[f"{column}_sd"] = unit * self._gait.sd(name, phase)
             for side, leg in self._measured.legs.items():
-                if side and _has(leg, name):
+                if side and _has_strides(leg, name):
                     columns[f"{column}_{side}"] = unit * leg.counted(name).mean(axis=0)
                     if len(leg.counted(name)) > 1:
                         columns[f"{column}_{side}_sd"] = unit * leg.counted(name).std(axis=0, ddof=1)
@@ -234,7 +237,7 @@ class _Sheet:
 
     def _toe_moment(self) -> NDArray | None:
         """Return the mean moment of the toe (101,) [N m/kg] of the strides that count; None if it was not measured."""
-        counted = [leg.counted("toe_moment") for leg in self._measured.legs.values() if _has(leg, "toe_moment")]
+        counted = [leg.counted("toe_moment") for leg in self._measured.legs.values() if _has_strides(leg, "toe_moment")]
         return np.concatenate(counted).mean(axis=0) if counted else None
 
     def _schedule(self) -> StiffnessSchedule:
@@ -267,24 +270,24 @@ class _Sheet:
         return with_swing(StiffnessSchedule(*damped), body)
 
     @property
-    def _policy(self) -> str:
+    def _policy_name(self) -> str:
         """Return the name of the schedule as a policy."""
         return f"person {self._measured.gait.name}"
 
     def _schedule_csv(self, springs: StiffnessSchedule) -> str:
-        """Return the springs over percent of the stride."""
+        """Return the CSV of K and rest angle of ankle and toe over percent of the stride."""
         stiffness, rest = springs.at(np.minimum(PERCENT, 99.999) / 100)
         curves = {f"{joint}_stiffness_Nm_per_rad": stiffness[:, k] for k, joint in enumerate(SPRINGS)}
         curves |= {f"{joint}_equilibrium_deg": np.degrees(rest[:, k]) for k, joint in enumerate(SPRINGS)}
-        return schedule_csv(self._policy, self._body, self._speed, "phase", curves)
+        return schedule_csv(self._policy_name, self._body, self._speed, "phase", curves)
 
-    def _states(self, springs: StiffnessSchedule) -> str:
-        """Return the springs as finite states, which begin at the events of ankle and toe."""
+    def _finite_states(self, springs: StiffnessSchedule) -> str:
+        """Return the JSON of the springs as finite states, one for each event at which a spring begins."""
         events: dict[float, str] = {}
         for joint in SPRINGS:
             starts = [segment.start for segment in getattr(springs, joint)]
-            known = _events(self._gait, joint)
-            events |= {start: known[round(start, 6)] for start in starts if start not in events}
+            names = _events(self._gait, joint)
+            events |= {start: names[round(start, 6)] for start in starts if start not in events}
         betas = damping_times(self._body)[-len(SPRINGS) :]
         states = []
         for start, event in sorted(events.items()):
@@ -297,23 +300,23 @@ class _Sheet:
                     "equilibrium_deg": float(np.degrees(rest[k])),
                 }
             states.append(state)
-        return states_json(table_of_states(self._policy, self._body, self._speed, states))
+        return states_json(table_of_states(self._policy_name, self._body, self._speed, states))
 
     # Words ---------------------------------------------------------------------------------------------------
 
     def _text(self, notes: list[str], has_schedule: bool) -> str:
-        """Return the report."""
+        """Return the report; `notes` are further items of its list, the schedule's paragraph needs `has_schedule`."""
         has_rows = any(row.side != "norm" for row in self.rows)
-        parts = [self._verdict(), self._table(), self._below(has_rows), NO_SPRING, self._read_list(notes)]
+        parts = [self._verdict(), self._table(), self._table_note(has_rows), NO_SPRING, self._read_list(notes)]
         if has_schedule:
             parts.append(self._schedule_words())
-        if self._asked.train is not None:
+        if self._flags.train is not None:
             parts.append(self._train_words())
         parts += ["![Curves](curves.png)", "![Moment over angle](torque_angle.png)"]
         return "\n\n".join(parts)
 
     def _verdict(self) -> str:
-        """Return the answer in a sentence."""
+        """Return a sentence with the ankle's quasi-stiffness in late mid-stance, on each side and in people."""
         pattern = ".0f" if self._mass else ".2f"
         late = {row.side: row.slope for row in self.rows if (row.joint, row.phase.name) == ("ankle", "late rising")}
         own = [f"{slope.value:{pattern}} {side}" for side, slope in late.items() if side != "norm" and slope]
@@ -324,8 +327,8 @@ class _Sheet:
         words = " and ".join(own).replace(" both", "")
         return f"**In late mid-stance the ankle's moment rises by {words} {self._unit}{beside}.**"
 
-    def _below(self, has_rows: bool) -> str:
-        """Return the paragraph below the table."""
+    def _table_note(self, has_rows: bool) -> str:
+        """Return the paragraph below the table; `has_rows` is True if it has a quasi-stiffness of the person."""
         several = any(row.slope and np.isfinite(row.slope.low) for row in self.rows)
         words = "In brackets: 95 % interval over strides"
         if not several:
@@ -343,7 +346,7 @@ class _Sheet:
         over_time = any(len(leg.times) for leg in self._measured.legs.values())
         without_mass = f": stiffness is per kg, the schedule of {REFERENCE_MASS:g} kg"
         lines = [
-            *self._asked.readings(self._measured, self._norm, without_mass),
+            *self._flags.readings(self._measured, self._norm, without_mass),
             f"Borrowed from the norm: {borrowed or 'nothing'}.",
             f"Filter: none on the curves; {FILTER}, on angles for events and joint powers."
             if over_time
@@ -354,7 +357,7 @@ class _Sheet:
 
     def _schedule_words(self) -> str:
         """Return the paragraph on the schedule, with the command that walks it."""
-        body = f"--mass {self._body.mass:.4g} --height {self._asked.height:g} --speed {self._speed:.3g}"
+        body = f"--mass {self._body.mass:.4g} --height {self._flags.height:g} --speed {self._speed:.3g}"
         borrowed = "" if self._toe_moment() is not None else " The toe's stiffness is the model's own."
         return (
             "`schedule.csv` and `finite_states.json` hold straight lines between events of the mean curves, both legs "
@@ -364,28 +367,28 @@ class _Sheet:
 
     def _train_words(self) -> str:
         """Return the command that trains towards this person."""
-        place = Path("curves.csv") if self._asked.out is None else self._asked.out / "curves.csv"
-        where = " in the folder of these results" if self._asked.out is None else ""
-        body = f"--mass {self._body.mass:.4g} --height {self._asked.height:g} --speed {self._speed:.3g}"
-        command = f"springfoot train --human {place} {body} --out {self._asked.train}"
+        place = Path("curves.csv") if self._flags.out is None else self._flags.out / "curves.csv"
+        where = " in the folder of these results" if self._flags.out is None else ""
+        body = f"--mass {self._body.mass:.4g} --height {self._flags.height:g} --speed {self._speed:.3g}"
+        command = f"springfoot train --human {place} {body} --out {self._flags.train}"
         return f"To train a policy towards this person{where}: `{command}`"
 
 
 def _events(gait: HumanGait, joint: str) -> dict[float, str]:
-    """Return the phases of a joint's events in stance -> their names; of those that coincide the last."""
+    """Return stride phase, to 6 decimals -> name of a joint's event in stance; of events at one phase the last."""
     phase = np.linspace(0.0, gait.toe_off, 1001)
     find = ankle_events if joint == "ankle" else toe_events
     times = find(phase, gait.mean(joint, phase), gait.toe_off).values()
     return {round(time, 6): name for time, name in zip(times, SPRING_EVENTS[joint], strict=True)}
 
 
-def _has(leg: Any, name: str) -> bool:
-    """Tell whether a leg has strides of a curve that count."""
+def _has_strides(leg: Any, name: str) -> bool:
+    """Return True if a leg (of `MeasuredPerson.legs`) has a stride of the curve `name` that counts."""
     return name in leg.curves and len(leg.counted(name)) > 0
 
 
 def _cell(row: PhaseStiffness, pattern: str) -> str:
-    """Return a cell of the table: slope, interval, part of the stride."""
+    """Return a cell of the table: slope, its interval in brackets, part of the stride; a dash for a slope of None."""
     part = f"{100 * row.phase.start:.0f}–{100 * row.phase.end:.0f} %"
     if row.slope is None:
         return f"{MISSING}, {part}"

@@ -41,7 +41,7 @@ def draw_curves(path: Path, sheet: Sheet, norm: HumanGait) -> None:
                     if name in curves:
                         ax.plot(PERCENT, unit * curves[name], color=LINE_COLOURS[side], lw=1.6, label=side)
                 ax.set_title(f"{name.replace('_', ' ').capitalize()}, {'deg' if is_angle else 'N·m/kg'}")
-                _finish(ax)
+                _add_grid(ax)
         for ax in figure.axes[-len(CURVE_PANELS[0]) :]:
             ax.set_xlabel("stride (%)")
         _legend(figure)
@@ -49,8 +49,10 @@ def draw_curves(path: Path, sheet: Sheet, norm: HumanGait) -> None:
 
 
 def draw_loops(path: Path, sheet: Sheet, norm: HumanGait, starts: Mapping[tuple[str, str], Sequence[float]]) -> None:
-    """Draw moment over angle in stance into the picture `path`; dots are the bounds of phases, `starts` by joint and
-    side."""
+    """Draw moment over angle in stance into the picture `path`, with dots at the bounds of the phases of stance.
+
+    `starts` is (joint, side) -> stride phases of the bounds; a side without any is not drawn.
+    """
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(8.4, 3.8), layout="constrained")
         phase = PERCENT / 100
@@ -63,20 +65,21 @@ def draw_loops(path: Path, sheet: Sheet, norm: HumanGait, starts: Mapping[tuple[
                 at = np.linspace(bounds[0], bounds[-1], 200)
                 angle, moment = (curves[name] for name in (joint, f"{joint}_moment"))
                 colour = LINE_COLOURS.get(side, PEOPLE)
-                ax.plot(*_point(at, angle, moment), color=colour, lw=1.5, label=side)
-                ax.plot(*_point(bounds, angle, moment), "o", color=colour, ms=3.5)
+                ax.plot(*_curve_points(at, angle, moment), color=colour, lw=1.5, label=side)
+                ax.plot(*_curve_points(bounds, angle, moment), "o", color=colour, ms=3.5)
             ax.set(title=f"{joint.capitalize()}, stance", xlabel="angle (deg)", ylabel="moment (N·m/kg)")
-            _finish(ax)
+            _add_grid(ax)
         _legend(figure)
         figure.savefig(path, dpi=110, **PNG)
 
 
-def _point(at: NDArray, angle: NDArray, moment: NDArray) -> tuple[NDArray, NDArray]:
-    """Return angle [deg] and moment of curves (101,) at stride phases `at`."""
+def _curve_points(at: NDArray, angle: NDArray, moment: NDArray) -> tuple[NDArray, NDArray]:
+    """Return angle [deg] and moment at the stride phases `at`, interpolated on the curves `angle` [rad] and `moment`,
+    (101,) each."""
     return np.degrees(np.interp(at, PERCENT / 100, angle)), np.interp(at, PERCENT / 100, moment)
 
 
-def _finish(ax: Axes) -> None:
+def _add_grid(ax: Axes) -> None:
     """Give the axes a grid."""
     ax.grid(color="#ededed", lw=0.6)
 

@@ -164,7 +164,7 @@ def _holds(estimate: Estimate | None, truth: float) -> bool:
 
 
 def _percent_text(hits: Sequence[Sequence[bool]]) -> str:
-    """Return how often something holds, as in "94.2 % (90.0–98.5)": over all, then in the worst and the best phase.
+    """Return the percentage of True, as in "94.2 % (90.0–98.5)": over all, then in the worst and the best phase.
 
     `hits` has for each phase a bool for each repeat; a dash stands for no phases.
     """
@@ -217,7 +217,7 @@ class Identify(WalkingStudy):
         return len(self.policies) * (once + repeats)
 
     def ask(self, progress: OnProgress) -> Answer:
-        """Push every policy, and find its springs."""
+        """Push every policy, and find its springs; with `repeats` tell how often their intervals hold the truth."""
         experiments = [self._identify_policy(name, progress) for name in self.policies]
         if self.repeats:
             text = f"{coverage_table(experiments)}\n\n{self._coverage_note} {self._pushes}"
@@ -255,8 +255,8 @@ class Identify(WalkingStudy):
         )
 
     def _identify_policy(self, name: str, progress: OnProgress) -> Experiment:
-        """Walk a policy pushed and undisturbed, and identify its springs; identify them again on shorter walks with
-        other seeds."""
+        """Walk a policy pushed and undisturbed, and identify its springs; for each of `repeats` identify them again on
+        shorter pushed walks with other seeds."""
         pushes = ("push_newton", "push_seconds", "push_interval")
         conditions: dict[str, Any] = {key: getattr(self, key) for key in pushes} | {"episode_seconds": self.seconds}
         conditions |= {"decisions": self.decisions} if self.decisions else {}

@@ -69,10 +69,12 @@ class StiffnessClass:
         def act(observation: NDArray) -> NDArray:
             """Return the actions (N, 4) at phases and errors of the observations (N, D)."""
             phase = leg_phase(observation)  # (N, side)
-            logs = np.stack([ankle[rows, _part(self.ankle, phase)], toe[rows, _part(self.toe, phase)]], axis=-1)
+            logs = np.stack(
+                [ankle[rows, _part_index(self.ankle, phase)], toe[rows, _part_index(self.toe, phase)]], axis=-1
+            )
             if self.gains:
                 errors = observation[:, _COLUMNS] / _UNITS
-                of_phase = gains[rows, :, _part(self.gains, phase)]  # (N, side, error)
+                of_phase = gains[rows, :, _part_index(self.gains, phase)]  # (N, side, error)
                 logs[..., 0] += (of_phase * errors[:, None]).sum(-1)
             action = action_of(centre * np.exp(logs), settings, body)
             return action.reshape(len(observation), -1).astype(np.float32)
@@ -83,7 +85,9 @@ class StiffnessClass:
         """Return ankle's and toe's K (n, 2) [N m/rad] of one vector at stride phases (n,), for 1.70 m and 63 kg and
         without errors."""
         ankle, toe, _ = self.split(vector)
-        return np.array(CENTRE) * np.exp(np.stack([ankle[_part(self.ankle, phase)], toe[_part(self.toe, phase)]], -1))
+        return np.array(CENTRE) * np.exp(
+            np.stack([ankle[_part_index(self.ankle, phase)], toe[_part_index(self.toe, phase)]], -1)
+        )
 
 
 def widened(vector: ArrayLike, inner: StiffnessClass, outer: StiffnessClass) -> NDArray:
@@ -91,8 +95,8 @@ def widened(vector: ArrayLike, inner: StiffnessClass, outer: StiffnessClass) -> 
     ankle, toe, gains = inner.split(vector)
     wide_gains = np.zeros((len(ERRORS), len(outer.gains)))
     if inner.gains:
-        wide_gains = gains[:, _part(inner.gains, outer.gains)]
-    wide = ankle[_part(inner.ankle, outer.ankle)], toe[_part(inner.toe, outer.toe)], wide_gains.ravel()
+        wide_gains = gains[:, _part_index(inner.gains, outer.gains)]
+    wide = ankle[_part_index(inner.ankle, outer.ankle)], toe[_part_index(inner.toe, outer.toe)], wide_gains.ravel()
     return np.concatenate(wide)
 
 
@@ -103,9 +107,9 @@ def nested_classes(settings: BipedSettings) -> tuple[StiffnessClass, ...]:
     """
     gait = reference_gait(settings)
     phase = np.linspace(0.0, gait.toe_off, 1001)
-    ankle = _starts(ankle_events(phase, gait.mean("ankle", phase), gait.toe_off))
-    toe = _starts(toe_events(phase, gait.mean("toe", phase), gait.toe_off))
-    finer = {"ankle": _divided(ankle), "toe": _divided(toe)}
+    ankle = _distinct_phases(ankle_events(phase, gait.mean("ankle", phase), gait.toe_off))
+    toe = _distinct_phases(toe_events(phase, gait.mean("toe", phase), gait.toe_off))
+    finer = {"ankle": _subdivided_starts(ankle), "toe": _subdivided_starts(toe)}
     return (
         StiffnessClass(name="constant"),
         StiffnessClass(name="per phase", ankle=ankle, toe=toe),
@@ -114,18 +118,19 @@ def nested_classes(settings: BipedSettings) -> tuple[StiffnessClass, ...]:
     )
 
 
-def _part(starts: ArrayLike, phase: ArrayLike) -> NDArray:
-    """Return the index of the part, of those that begin at `starts`, that holds at stride phases of any shape."""
+def _part_index(starts: ArrayLike, phase: ArrayLike) -> NDArray:
+    """Return, for stride phases of any shape, the index of the part in which each lies; the parts begin at `starts`."""
     return np.searchsorted(starts, phase, side="right") - 1
 
 
-def _starts(events: dict[str, float]) -> tuple[float, ...]:
-    """Return the distinct phases of events that begin with heel strike at 0."""
+def _distinct_phases(events: dict[str, float]) -> tuple[float, ...]:
+    """Return the distinct stride phases of `events`, ascending; the first is heel strike at 0."""
     return tuple(sorted(set(events.values())))
 
 
-def _divided(starts: tuple[float, ...]) -> tuple[float, ...]:
-    """Return the starts of parts cut into equal ones of at most `LONGEST_PART`; those given are among them."""
+def _subdivided_starts(starts: tuple[float, ...]) -> tuple[float, ...]:
+    """Return the starts of finer parts: each part is cut into equal ones of at most `LONGEST_PART`. All of `starts` are
+    among them."""
     finer = []
     for begin, end in zip(starts, (*starts[1:], 1.0), strict=True):
         pieces = ceil((end - begin) / LONGEST_PART - 1e-9)

@@ -95,8 +95,8 @@ def summarise(walks: PairedWalks, change: float) -> Response:
 
 
 def _values(walks: PairedWalks) -> dict[Key, NDArray]:
-    """Return the measured quantities by key, (C, S) each; "many" is the mean over the second half of the strides, but
-    the last stride for `com_ahead_m`."""
+    """Return the measured quantities by key, (cells, seeds) each; "many" is the mean over the second half of the
+    strides, but the last stride for `com_ahead_m`."""
     values: dict[Key, NDArray] = {("fixed state", name, ""): walks.fixed[..., k] for k, name in enumerate(FIXED)}
     values[VELOCITY] = walks.velocity
     half = walks.movement.shape[3] // 2
@@ -111,9 +111,9 @@ def _values(walks: PairedWalks) -> dict[Key, NDArray]:
 
 
 def _link(x: NDArray, y: NDArray) -> tuple[float, float, float, float]:
-    """Return an entry of `Response.links`: the correlation over the cells of two quantities, (C, S) each.
+    """Return an entry of `Response.links`: the correlation over the cells of two quantities, (cells, seeds) each.
 
-    Seeds that fall in any cell are left out.
+    Seeds that fall in any cell are left out; NaN if fewer than two are left.
     """
     complete = np.isfinite(x + y).all(0)
     x = x[:, complete]
@@ -122,7 +122,7 @@ def _link(x: NDArray, y: NDArray) -> tuple[float, float, float, float]:
         return np.nan, np.nan, np.nan, np.nan
 
     def r(seeds: NDArray, axis: int = -1) -> Any:
-        """Return r of the means over these seeds; `bootstrap` gives many resamples of seeds at once."""
+        """Return Pearson's r over the cells of the means over `seeds`; `bootstrap` passes many resamples at once."""
         result: Any = pearsonr(x[:, seeds].mean(axis), y[:, seeds].mean(axis), axis=0)
         return result.statistic
 

@@ -254,7 +254,7 @@ class _Record:
         biped.on_tick = self._keep
 
     def _keep(self, tick: Tick) -> None:
-        """Keep all walks' positions and forces, and phase and stride of the unchanged ones.
+        """Append a tick's `_Series`: all walks' positions and forces, phase and stride of the unchanged ones.
 
         In their first stride also compute the effect of each change on the present state (`_sample`).
         """
@@ -306,7 +306,7 @@ class _Record:
             movement[index] = _movement(com, series.ankle[:, index], contacts, landed, clocks[seed])
         movement = movement.reshape(-1, self._num, *movement.shape[1:])  # (copies, S, K, len(MOVEMENT))
         # Velocity of all copies of a seed when each phase of its unchanged first stride ends.
-        ends = np.stack([_ends(*of_seed) for of_seed in zip(series.phase.T, series.stride.T, strict=True)], -1)
+        ends = np.stack([_phase_ends(*of_seed) for of_seed in zip(series.phase.T, series.stride.T, strict=True)], -1)
         velocity = series.velocity.reshape(len(series.velocity), -1, self._num)  # (T, copies, S)
         at_ends = velocity[ends, :, np.arange(self._num)]  # (phases, S, copies)
         one_stride = 1 + np.arange(len(CELLS)) * len(DURATIONS)  # copy with each cell's change of one stride
@@ -324,8 +324,9 @@ class _Record:
         )
 
 
-def _ends(phase: NDArray, stride: NDArray) -> list[int]:
-    """Return the last tick of each of `PHASES` in the first stride, from a leg's `phase` and `stride` (T,)."""
+def _phase_ends(phase: NDArray, stride: NDArray) -> list[int]:
+    """Return the last tick of each of `PHASES` in the first stride, from a leg's `phase` and `stride` at T ticks, (T,)
+    each."""
     until_next = np.where(stride <= 0, phase, 1.0)  # phase; 1 once the first stride is over
     begin = np.argmax(stride == 0)
     return [int(begin + np.argmax(until_next[begin:] >= end)) - 1 for _, end in PHASES.values()]
@@ -334,8 +335,8 @@ def _ends(phase: NDArray, stride: NDArray) -> list[int]:
 def _movement(com: NDArray, ankle: NDArray, contacts: list[Contacts], landed: NDArray, clock: NDArray) -> NDArray:
     """Return the quantities of `MOVEMENT` in each stride, (K, len(MOVEMENT)), of one walk.
 
-    `com` (T, 2) and `ankle` (T, side) are positions [m], `landed` (K + 1,) the left foot's heel strikes [s], and
-    `clock` (K,) the ends of the unchanged walk's mean strides [s].
+    Over T ticks and K strides, `com` (T, (x, z)) are positions and `ankle` (T, side) forward ones [m], `landed`
+    (K + 1,) the left foot's heel strikes [s], and `clock` (K,) the ends of the unchanged walk's mean strides [s].
     """
     com_at_strikes = sample(com[:, 0], landed, TICK, TICK)
     speed = np.diff(com_at_strikes) / np.diff(landed)

@@ -126,7 +126,7 @@ class When(WalkingStudy):
         return len(self.aims) * (searched + tested) * self.seconds
 
     def ask(self, progress: OnProgress) -> Answer:
-        """Search, test, and compare."""
+        """Search both classes of every link for every aim, walk the test with both, and compare them."""
         if self.keep is not None:
             self.keep.mkdir(parents=True, exist_ok=True)
         kept = Kept(None if self.keep is None else self.keep / "numbers.json")
@@ -140,7 +140,7 @@ class When(WalkingStudy):
             found.append((aim, outer, best[aim]))
             for condition in self._conditions:
                 walks = [
-                    self._tested(kept, of_class, vector, condition, progress)
+                    self._test_numbers(kept, of_class, vector, condition, progress)
                     for of_class, vector in ((inner, went_on), (outer, best[aim]))
                 ]
                 links.append(compared(aim, (inner.name, outer.name), condition.words, *walks))
@@ -160,8 +160,11 @@ class When(WalkingStudy):
         link: StiffnessClass,
         progress: OnProgress,
     ) -> NDArray:
-        """Return the vector that a search of the link to the class `link` finds from `start`: its mean at the end, or
-        the start itself if that costs no more on other walks."""
+        """Search the class `of_class` from the vector `start`, for the link whose outer class is `link`; return the
+        vector found: the search's mean at the end, or `start` if that costs no more on other walks.
+
+        Costs in `kept` and in the folder `keep` are not computed again.
+        """
 
         def costs_of(generation: int, vectors: list[NDArray]) -> NDArray:
             """Return the costs of a generation, whose candidates all walk from the same start."""
@@ -169,7 +172,7 @@ class When(WalkingStudy):
 
         options = {"popsize": self.population, "seed": self.seed + 1, "verbose": -9}
         strategy = cma.CMAEvolutionStrategy(start, FIRST_SPREAD, options)
-        question = [*self._asked, aim, of_class.name, link.name, start.tolist()]
+        question = [*self._flags_in_question, aim, of_class.name, link.name, start.tolist()]
         name = f"{aim}-{link.name}-{of_class.name}.json".replace(" ", "-")
         file = None if self.keep is None else self.keep / name
         for _ in generations(strategy, self.generations, costs_of, file, question):
@@ -177,11 +180,11 @@ class When(WalkingStudy):
         ends = [start, np.asarray(strategy.mean)]
         first_seed = self.seed + TEST_SEED // 2
 
-        def chosen() -> dict[str, Any]:
+        def costs_of_ends() -> dict[str, Any]:
             """Return the costs of start and mean on walks that the generations did not have."""
             return {"costs": self._costs(aim, of_class, ends, first_seed, CHOOSING, progress).tolist()}
 
-        return ends[int(np.argmin(kept.get([*question, [end.tolist() for end in ends]], chosen)["costs"]))]
+        return ends[int(np.argmin(kept.get([*question, [end.tolist() for end in ends]], costs_of_ends)["costs"]))]
 
     def _costs(
         self,
@@ -192,8 +195,8 @@ class When(WalkingStudy):
         starts: int,
         progress: OnProgress,
     ) -> NDArray:
-        """Return the cost of each vector, (V,), from `starts` pushed walks: the aim's number, the error of speed and
-        the share that falls."""
+        """Return the cost of each of V vectors, (V,), from `starts` pushed walks: the aim's number plus costs of the
+        error of speed and of the share that falls; `NO_WALK` if no number could be measured."""
         pushed = Condition(push_newton=self.pushes[0])
         costs = []
         for walked in self._walk(of_class, vectors, seed, starts, pushed, progress):
@@ -205,13 +208,14 @@ class When(WalkingStudy):
                 costs.append(numbers[aim] + FALL_COST * ((walked.fall_reason != "").mean() + error**2))
         return np.array(costs)
 
-    def _tested(
+    def _test_numbers(
         self, kept: Kept, of_class: StiffnessClass, vector: NDArray, condition: Condition, progress: OnProgress
     ) -> dict[str, Any]:
-        """Return the numbers of the test's episodes under a condition, a list of each."""
+        """Return `fell` and the numbers of `numbers_of` as lists over the test's episodes under a condition; they come
+        from `kept` if it has them."""
 
         def make() -> dict[str, Any]:
-            """Walk; return the numbers of each episode."""
+            """Walk the test's episodes; return their lists."""
             (walked,) = self._walk(of_class, [vector], self.seed + TEST_SEED, self.episodes, condition, progress)
             rows = [numbers_of(walked.of_episode(index)) for index in range(self.episodes)]
             return {
@@ -219,7 +223,7 @@ class When(WalkingStudy):
                 **{name: [row[name] for row in rows] for name in rows[0]},
             }
 
-        return kept.get([*self._asked, self.episodes, of_class.name, vector.tolist(), condition], make)
+        return kept.get([*self._flags_in_question, self.episodes, of_class.name, vector.tolist(), condition], make)
 
     def _walk(
         self,
@@ -251,7 +255,7 @@ class When(WalkingStudy):
         ]
 
     def _text(self, links: Sequence[Link]) -> str:
-        """Return the report."""
+        """Return the report: verdict, a table of links for each aim, and a note."""
         fewest = fewest_falls(self.episodes)
         seen = f"from {fewest} of them on" if fewest else "by no number of them"
         seeds = f"seeds {self.seed + TEST_SEED}–{self.seed + TEST_SEED + self.episodes - 1}"
@@ -278,23 +282,23 @@ class When(WalkingStudy):
 
     @property
     def _person(self) -> str:
-        """Return the setting `person`."""
+        """Return the path of the person's policy, the value of the setting `person`."""
         return str(find_policy(self.person))
 
     @property
     def _classes(self) -> tuple[StiffnessClass, ...]:
-        """Return the classes, each within the next."""
+        """Return the classes of stiffness for the default body, each within the next."""
         return nested_classes(BipedSettings())
 
     @property
-    def _asked(self) -> list[Any]:
-        """Return what all costs and numbers depend on, as plain JSON values."""
+    def _flags_in_question(self) -> list[Any]:
+        """Return the flags on which all costs and numbers depend, as plain JSON values."""
         return [self.person, self.seconds, self.seed, self.population, self.pushes[0]]
 
 
 @lru_cache(maxsize=8)
 def _batch(person: str, seconds: float, condition: Condition, count: int, threads: int) -> Biped:
-    """Return `count` environments, to be reset before each use."""
+    """Return `count` environments with the person and the condition, cached: reset them before each use."""
     given = {"person": person, "episode_seconds": seconds, **condition._asdict()}
     _, settings = policy_and_settings("constant", given)
     return Biped(settings, count, threads)
@@ -312,7 +316,7 @@ def numbers_of(recording: Recording) -> dict[str, Any]:
 
 
 def _stiffness_csv(found: Sequence[tuple[str, StiffnessClass, NDArray]]) -> str:
-    """Return the CSV of K over the stride of each found stiffness."""
+    """Return the CSV of K over the stride, without errors, for each (aim, class, vector) of `found`."""
     lines = [
         [aim, of_class.name, 100 * phase, *stiffness]
         for aim, of_class, vector in found
@@ -322,7 +326,8 @@ def _stiffness_csv(found: Sequence[tuple[str, StiffnessClass, NDArray]]) -> str:
 
 
 def draw(path: Path, found: Sequence[tuple[str, StiffnessClass, NDArray]]) -> None:
-    """Draw K over the stride, without errors: a row of panels for each joint, a column for each aim."""
+    """Draw K over the stride, without errors, for each (aim, class, vector) of `found`: a row of panels for each joint,
+    a column for each aim."""
     aims = list(dict.fromkeys(aim for aim, _, _ in found))
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(4.2 * len(aims), 5.2), layout="constrained")

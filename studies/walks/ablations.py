@@ -1,4 +1,5 @@
-"""Measure the contribution of each part of preset `walk`, by training without it, and of each input of the fixed walk.
+"""Measure the contribution of each part of preset `walk`, by training without it, and of each input of the walk
+with the tuned schedule.
 
     springfoot study ablations --seeds 3 --constant 363 79.5
 
@@ -100,7 +101,7 @@ RESULT = "ablation.json"
 
 
 def phase_schedule(settings: BipedSettings) -> StiffnessSchedule:
-    """Return planned rest angles and fixed schedule of `settings` as ten springs of constant K and theta_eq.
+    """Return the planned rest angles and the tuned schedule of `settings` as ten springs of constant K and theta_eq.
 
     Each stretch of the stride between two of `PLATEAUS` has one spring: its mean K, and the rest angle with the same
     mean K theta_eq. With fewer springs, as between gait events, the walk falls.
@@ -152,7 +153,10 @@ Rows = dict[str, list[dict[str, Any]]]
 
 
 def measure_trained(out: Path, walks: PushedWalks) -> Rows:
-    """Measure the finished seeds of each row of `ABLATIONS`, in order; rows without a finished seed are left out."""
+    """Return the metrics of the finished seeds of each row of `ABLATIONS`; rows without a finished seed are left out.
+
+    Metrics that a seed's folder keeps are not measured again.
+    """
     rows = {}
     for name in ABLATIONS:
         folders = sorted((out / name).glob("seed-*"), key=lambda folder: int(folder.name.removeprefix("seed-")))
@@ -165,7 +169,8 @@ def measure_trained(out: Path, walks: PushedWalks) -> Rows:
 
 
 def measure_inputs(out: Path, walks: PushedWalks) -> Rows:
-    """Measure the fixed schedule with each of `INPUTS`, and with the ankle's angle alone as rest angle."""
+    """Return the metrics of the baseline `schedule` with the leg constants of each of `INPUTS`, and with people's ankle
+    angle alone as rest angle. Metrics that the folder `out` keeps are not measured again."""
     tuned = reference_walk_at(BipedSettings(), BipedSettings().speed).constants[0]
     rows: Rows = {}
     for number, (name, change) in enumerate(INPUTS.items()):
@@ -178,7 +183,8 @@ def measure_inputs(out: Path, walks: PushedWalks) -> Rows:
 
 
 def measure_springs(out: Path, walks: PushedWalks, constant: tuple[float, float] | None) -> Rows:
-    """Measure the thesis's straight lines, and before them a `constant` (ankle, toe) [N m/rad] if given."""
+    """Return the metrics of the baseline `thesis`, and before it of the stiffness `constant` (ankle, toe) [N m/rad]
+    unless that is None. Metrics that the folder `out` keeps are not measured again."""
     names = {"thesis lines": "thesis"}
     if constant is not None:
         names = {"best fixed spring": "constant:{:g},{:g}".format(*constant)} | names
@@ -212,7 +218,7 @@ def rows_table(rows: Rows, head: str, people: bool = False) -> str:
 
 
 def _people_cell(metrics: dict[str, Any], column: Column) -> str:
-    """Return people's number of a column, from metrics nested as those of a walk without its condition; empty if there
+    """Return people's number of a column, from `metrics` nested as those of a walk under one condition; a dash if there
     is none."""
     value: Any = metrics
     for key in column.path[1:]:  # [0] is the condition
@@ -298,8 +304,10 @@ class Ablations(WalkingStudy):
         return Answer(text=text, files={"ablations.csv": ablations_csv(tables)}, failed=failed)
 
     def _train(self) -> bool:
-        """Train what is not finished; return True if a training failed. Raises `KeyboardInterrupt` if the user stopped
-        it."""
+        """Train the missing seeds of each row, none without the flag `train`; return True if a training failed.
+
+        Raises `KeyboardInterrupt` if the user stopped one.
+        """
         missing = jobs(self.runs, self.only or tuple(ABLATIONS), self.seeds, self.timesteps)
         status = train_missing(missing, self.engine) if self.train else "finished"
         if status == "interrupted":

@@ -86,7 +86,7 @@ def walk_pairs(
 
 
 def _row(recording: Recording) -> dict[str, Any]:
-    """Return the numbers of one pair's episode, as in pairs.csv."""
+    """Return the row of pairs.csv for the recording of one pair's episode."""
     metrics = measure(recording).metrics
     settings = recording.settings
     speed = metrics["speed_m_s"]["mean"]
@@ -142,7 +142,7 @@ def _pairs_that_stood(rows: Sequence[Mapping[str, Any]], column: str, badness: C
 
 
 def _spread(standing: Sequence[Mapping[str, Any]], column: str, pattern: str) -> list[str]:
-    """Return median, 95 % bound and worst magnitude of a column, as text, from pairs with the worst last."""
+    """Return median, 95 % bound and worst magnitude of a column as text; `standing` are rows with the worst last."""
     size = [abs(row[column]) for row in standing]
     bound = size[int(np.ceil(0.95 * len(size))) - 1]  # 95 % of the pairs are no worse than this one
     return [format(value, pattern) for value in (np.median(size), bound, size[-1])]

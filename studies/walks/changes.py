@@ -36,31 +36,31 @@ a number and its spread."""
 
 
 def highest(curve: NDArray, spread: NDArray, tick: float) -> tuple[float, float]:
-    """Return the highest value and the spread there."""
+    """Return the highest value of `curve`, and `spread` at that sample."""
     at = int(np.argmax(curve))
     return float(curve[at]), float(spread[at])
 
 
 def lowest(curve: NDArray, spread: NDArray, tick: float) -> tuple[float, float]:
-    """Return the lowest value and the spread there."""
-    value, there = highest(-curve, spread, tick)
-    return -value, there
+    """Return the lowest value of `curve`, and `spread` at that sample."""
+    value, spread_there = highest(-curve, spread, tick)
+    return -value, spread_there
 
 
 def extent(curve: NDArray, spread: NDArray, tick: float) -> tuple[float, float]:
-    """Return the difference between the highest and the lowest value, and its spread if both vary apart."""
+    """Return the difference of the highest and the lowest value, and its spread if the two vary independently."""
     (high, high_spread), (low, low_spread) = highest(curve, spread, tick), lowest(curve, spread, tick)
     return high - low, hypot(high_spread, low_spread)
 
 
 def positive_work(curve: NDArray, spread: NDArray, tick: float) -> tuple[float, float]:
-    """Return the work of the positive part of a power, and the work of its spread there, the most that its own may
-    be."""
+    """Return the work [J/kg] of the positive part of the power `curve` [W/kg], and an upper bound of its spread: the
+    work of `spread` where the power is positive."""
     return tick * float(np.maximum(curve, 0.0).sum()), tick * float(spread[curve > 0.0].sum())
 
 
 def negative_work(curve: NDArray, spread: NDArray, tick: float) -> tuple[float, float]:
-    """Return the amount of work of the negative part of a power, and its spread as in `positive_work`."""
+    """Return the size of the work of the negative part of the power `curve`, and its spread as in `positive_work`."""
     return positive_work(-curve, spread, tick)
 
 
@@ -115,7 +115,7 @@ class Stride:
     """Duration [s]."""
 
     def number(self, quantity: Quantity) -> tuple[float, float]:
-        """Return a quantity and its spread."""
+        """Return the value of `quantity` in its part of the stride, and its spread between people."""
         part = (quantity.part[0] <= PERCENT) & (quantity.part[1] >= PERCENT)
         return quantity.measure(
             self.curves[quantity.curve][part], self.spreads[quantity.curve][part], self.stride_time / 100
@@ -123,19 +123,19 @@ class Stride:
 
 
 def stride_of_gait(gait: HumanGait) -> Stride:
-    """Return the stride of people's mean curves, or of a plan's."""
+    """Return the mean curves of people's gait or of a plan, and their spread; curves that `gait` lacks are left out."""
     phase = PERCENT / 100
     units = {name: 180.0 / np.pi if column.endswith("_deg") else 1.0 for name, column in COLUMNS.items()}
-    known = [name for name in COLUMNS if name in gait.mean_series]
+    names = [name for name in COLUMNS if name in gait.mean_series]
     return Stride(
-        curves={name: units[name] * gait.mean(name, phase) for name in known},
-        spreads={name: units[name] * gait.sd(name, phase) for name in known},
+        curves={name: units[name] * gait.mean(name, phase) for name in names},
+        spreads={name: units[name] * gait.sd(name, phase) for name in names},
         stride_time=gait.stride_time,
     )
 
 
 def stride_of_walk(gait: Gait) -> Stride:
-    """Return the stride of a measured walk."""
+    """Return the mean curves of a measured walk over both legs' strides, with spreads of 0."""
     curves = {name: gait.both.mean(column) for name, column in COLUMNS.items() if column in gait.both.names}
     return Stride(
         curves=curves,
@@ -175,28 +175,28 @@ class Changes(WalkingStudy):
 
     @property
     def total(self) -> float:
-        """Simulated seconds without falls."""
+        """Return the simulated time of all walks if none falls [s]."""
         return len(self.policies) * len(self.speeds) * self.episodes * self.seconds
 
     def ask(self, progress: OnProgress) -> Answer:
-        """Walk every policy at both speeds."""
+        """Walk every policy at both speeds; hold its changes, and the plan's, against people's."""
         people = [stride_of_gait(human_gait(speed)) for speed in self.speeds]
         walks: dict[str, list[Stride | None]] = {"the plan": [stride_of_gait(self._plan(s)) for s in self.speeds]}
-        told = []
+        sentences = []
         for name in self.policies:
             gaits = [self._walk(name, speed, progress) for speed in self.speeds]
             walks[name] = [stride_of_walk(gait) if gait.both.count else None for gait in gaits]
-            told += [_how_it_walked(name, speed, gait) for speed, gait in zip(self.speeds, gaits, strict=True)]
+            sentences += [_how_it_walked(name, speed, gait) for speed, gait in zip(self.speeds, gaits, strict=True)]
         whole = {name: [stride for stride in strides if stride] for name, strides in walks.items()}
         changed = {name: strides for name, strides in whole.items() if len(strides) == len(self.speeds)}
-        about = f"From {self.speeds[0]:g} to {self.speeds[1]:g} m/s: {self.what_ran}. {' '.join(told)}"
+        about = f"From {self.speeds[0]:g} to {self.speeds[1]:g} m/s: {self.what_ran}. {' '.join(sentences)}"
         return Answer(
             text=f"{curves_table(people, changed)}\n\n{numbers_table(people, changed)}\n\n{about}",
             files={"changes.csv": changes_csv(people, changed)},
         )
 
     def _walk(self, name: str, speed: float, progress: OnProgress) -> Gait:
-        """Return a policy's walk at a commanded speed [m/s]."""
+        """Record a policy's walk at a commanded speed [m/s]; return its measurements."""
         act, settings = policy_and_settings(name, {"speed": speed, "episode_seconds": self.seconds})
         return measure(record(act, settings, name=name, progress=progress, **self.how))
 
@@ -214,13 +214,17 @@ def _how_it_walked(name: str, speed: float, gait: Gait) -> str:
 
 
 def _changes(strides: Sequence[Stride], quantity: Quantity) -> tuple[float, float]:
-    """Return the change of a quantity from the first to the second stride, and its spread in the first."""
+    """Return the change of `quantity` from the slower to the faster of two `strides`, and its spread in the slower."""
     (before, spread), (after, _) = (stride.number(quantity) for stride in strides)
     return after - before, spread
 
 
 def curves_table(people: Sequence[Stride], walks: Mapping[str, Sequence[Stride]]) -> str:
-    """Return the Markdown table of the change of angles over the stride: rms of its error [°], and r with people's."""
+    """Return the Markdown table of the changes of angles over the stride, from the slower to the faster speed.
+
+    `people` and each of `walks` are the strides at the two speeds. A cell has the rms distance of a change from
+    people's [°], and in brackets r with it.
+    """
     change = {joint: people[1].curves[joint] - people[0].curves[joint] for joint in COMPARED_JOINTS}
     lines = [["nothing changes", *(text_of(rmse(values, 0.0 * values), ".1f") for values in change.values())]]
     for name, strides in walks.items():
@@ -233,8 +237,10 @@ def curves_table(people: Sequence[Stride], walks: Mapping[str, Sequence[Stride]]
 
 
 def numbers_table(people: Sequence[Stride], walks: Mapping[str, Sequence[Stride]]) -> str:
-    """Return the Markdown table of changes of `QUANTITIES`; the last lines count signs and sizes of those that change
-    in people by more than the spread."""
+    """Return the Markdown table of the changes of `QUANTITIES`; `people` and `walks` as of `curves_table`.
+
+    The last lines count right signs and right sizes, of the quantities that change in people by more than their spread.
+    """
     lines = []
     right = dict.fromkeys(walks, 0)
     alike = dict.fromkeys(walks, 0)

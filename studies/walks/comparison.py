@@ -139,10 +139,10 @@ def springs_beside(
 ) -> list[Contender]:
     """Return the springs that need no learning, in the environment and with the reward of the policy `name`.
 
-    These are the start of its training; the tuned schedule, and a `factor` on it; a `constant` (ankle, toe) [N m/rad]
-    and the default one; people's quasi-stiffness as it is, and commanded `QUASI_SPEED`; the thesis's lines, completed
-    and as printed; random actions. Each row pays for changes of its own action. Raises `SpringfootError` for a policy
-    that moves the legs too.
+    The springs are: the action 0, with which a training starts (`untrained`); the tuned schedule, and a `factor` on it;
+    a `constant` stiffness (ankle, toe) [N m/rad], and the default one; people's quasi-stiffness at the commanded speed,
+    and commanded `QUASI_SPEED`; the thesis's lines, completed and as printed; random actions. The reward charges a
+    spring for changes of its own action. Raises `SpringfootError` for a policy that moves the legs too.
     """
     _, settings = policy_and_settings(name, given, seed)
     if settings.acts != "stiffness":
@@ -169,7 +169,7 @@ def spring_names(constant: tuple[float, float] | None, factor: float | None) -> 
 
 
 def comparison_table(rows: Sequence[Row]) -> str:
-    """Return the Markdown table of the first row's policy against the others."""
+    """Return the Markdown table of the policies: falls and return against the first row's, speed, RMSE."""
     first = rows[0]
     head = ["policy", "falls [95 %]", "p", "return", f"{first.name} is ahead by [95 %]", "speed m/s"]
     lines = []
@@ -317,7 +317,7 @@ class Compare(WalkingStudy):
         parts.append(INTERVALS)
         files = {"compare.csv": walks_csv(lines)}
         if self.world:
-            elsewhere = {name: self._elsewhere(name, progress) for name in self.policies}
+            elsewhere = {name: self._walk_world(name, progress) for name in self.policies}
             parts += [elsewhere_table(name, rows) for name, rows in elsewhere.items()]
             parts.append(f"{self.what_ran} of each row.")
             files["world.csv"] = walks_csv(
@@ -329,7 +329,7 @@ class Compare(WalkingStudy):
                 ]
             )
         if self.laboratory:
-            walks = {name: self._in_laboratory(name, progress) for name in self.policies}
+            walks = {name: self._walk_laboratory(name, progress) for name in self.policies}
             parts += [laboratory_table(name, of_policy) for name, of_policy in walks.items()]
             parts.append(
                 f"{self.what_ran} of each row, at the same command; in brackets the change from the usual walk. "
@@ -340,7 +340,7 @@ class Compare(WalkingStudy):
 
     @property
     def _conditions(self) -> dict[str, Any]:
-        """Return the environment settings of all rows."""
+        """Return the settings of all rows: no pushes, the flag `seconds`, then the environment's flags."""
         return {"push_newton": 0.0, "episode_seconds": self.seconds} | given(self.environment)
 
     def _with_copy_if_it_walks(self, name: str, conditions: dict[str, Any]) -> list[Contender]:
@@ -351,7 +351,7 @@ class Compare(WalkingStudy):
         except SpringfootError:
             return [alone]
 
-    def _elsewhere(self, name: str, progress: OnProgress) -> list[tuple[str, list["Row"]]]:
+    def _walk_world(self, name: str, progress: OnProgress) -> list[tuple[str, list["Row"]]]:
         """Walk a policy and its open-loop copy under each of `WORLD`; return each condition in words, with its rows."""
         walked = []
         for conditions in WORLD:
@@ -360,7 +360,7 @@ class Compare(WalkingStudy):
             walked.append((words, [run_row(*contender, **self.how, progress=progress) for contender in contenders]))
         return walked
 
-    def _in_laboratory(self, name: str, progress: OnProgress) -> dict[str, dict[str, Any]]:
+    def _walk_laboratory(self, name: str, progress: OnProgress) -> dict[str, dict[str, Any]]:
         """Walk a policy under each of `LABORATORY`; return the metrics by condition."""
         walks = {}
         for words, conditions in LABORATORY.items():

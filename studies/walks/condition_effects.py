@@ -29,23 +29,26 @@ def by_condition(walks: Sequence[Row], conditions: Iterable[Any], names: Sequenc
 
 
 def difference(name: str, of: Any, against: Any) -> Effect:
-    """Return the effect: a number in one condition less that in another."""
+    """Return the effect: the number `name` under the condition `of` less that under `against`."""
     return lambda measured: measured[of][name] - measured[against][name]
 
 
 def change(name: str, of: Any, against: Any) -> Effect:
-    """Return the effect: the change of a number from one condition to another [%]."""
+    """Return the effect: the change of the number `name` from the condition `against` to the condition `of` [%]."""
     return lambda measured: 100.0 * (measured[of][name] / measured[against][name] - 1.0)
 
 
 def per_unit(name: str, at: Mapping[Any, float], factor: float = 1.0) -> Effect:
-    """Return the effect: the slope of `factor` times a number over conditions, each `at` a place."""
+    """Return the effect: the slope (`slope`) of `factor` times the number `name` over conditions.
+
+    `at` has the place of each condition on the axis, such as its load [kg].
+    """
     return lambda measured: factor * slope(list(at.values()), [measured[key][name] for key in at])
 
 
 def slope(places: ArrayLike, values: ArrayLike) -> NDArray:
-    """Return the slopes (E,) of the lines of least squares through C conditions' `values` (C, E) over `places`, (C,) or
-    (C, E)."""
+    """Return for each of E episodes (E,) the slope of the line of least squares through `values` (C, E) over `places`,
+    (C,) or (C, E), of C conditions."""
     y = np.asarray(values)
     x = np.asarray(places)
     x = np.broadcast_to(x[:, None] if x.ndim == 1 else x, y.shape)
@@ -54,5 +57,5 @@ def slope(places: ArrayLike, values: ArrayLike) -> NDArray:
 
 
 def mean_of(effects: Mapping[str, Effect]) -> Effect:
-    """Return the effect: the mean of several."""
+    """Return the effect: in each episode the mean of several `effects`."""
     return lambda measured: np.mean([effect(measured) for effect in effects.values()], axis=0)

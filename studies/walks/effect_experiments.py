@@ -55,8 +55,8 @@ class Experiment:
 # Conditions ---------------------------------------------------------------------------------------------------
 
 
-def _passive(toe: float) -> dict[str, Any]:
-    """Return a passive right foot with a toe of that stiffness [N m/rad]."""
+def _passive_foot(toe: float) -> dict[str, Any]:
+    """Return the settings of a passive right foot with a toe of the stiffness `toe` [N m/rad]."""
     return {"right_foot": {"kind": "passive", "toe_stiffness": toe}}
 
 
@@ -72,7 +72,7 @@ _WEAK = {
 _EXO = {
     k: both(braced(ankle_stiffness=k, ankle_deg=-5.7, engages="dorsiflexion")) for k in (0.0, 50.0, 100.0, 150.0, 250.0)
 }
-_TOE = {"locked": _passive(LOCKED_TOE), "flexible": _passive(60.0)}
+_TOE = {"locked": _passive_foot(LOCKED_TOE), "flexible": _passive_foot(60.0)}
 _STIFF = {1.0: {}} | {factor: both(braced(toe_stiffness=(factor - 1.0) * TOE_STIFFNESS)) for factor in (2.0, 4.0)}
 _STIFF_NOTE = f"× 2 and × 4 are springs at the toe beside its own {TOE_STIFFNESS:g} N·m/rad"
 _LOADS_KG = {ratio: ratio * _BODY.mass for ratio in LOADS}
@@ -91,29 +91,37 @@ _HINGES = {
 }
 
 
-def _grades(*slopes_deg: float) -> dict[Any, dict[str, Any]]:
-    """Return a condition for each slope [deg]."""
+def _slope_conditions(*slopes_deg: float) -> dict[Any, dict[str, Any]]:
+    """Return slope [deg] -> settings of a walk on it."""
     return {slope_deg: {"slope_deg": slope_deg} if slope_deg else {} for slope_deg in slopes_deg}
 
 
 # Experiments --------------------------------------------------------------------------------------------------
 
 
-def _weak(effect_of: Callable[[float], Effect], **given: Any) -> Experiment:
-    """Return an experiment on weak calves in braces: the mean effect over their strengths."""
+def _weak_calf_experiment(effect_of: Callable[[float], Effect], **fields: Any) -> Experiment:
+    """Return an experiment on weak calves in braces: the mean over `STRENGTHS` of the effect at a calf's strength.
+
+    `fields` are further fields of `Experiment`.
+    """
     effects = {f"calf {strength:g}": effect_of(strength) for strength in STRENGTHS}
-    return Experiment(conditions=_WEAK, speed=1.1, effect=mean_of(effects), beside=effects, **given)
+    return Experiment(conditions=_WEAK, speed=1.1, effect=mean_of(effects), beside=effects, **fields)
 
 
-def _over_braces(name: str) -> Callable[[float], Effect]:
-    """Return the slope of a number over the brace's stiffness [1/(N m/deg)], for calves of a strength."""
+def _slope_over_braces(name: str) -> Callable[[float], Effect]:
+    """Return a function of the calf's strength that returns the effect: the slope of the number `name` over the brace's
+    stiffness [1/(N m/deg)]."""
     return lambda strength: per_unit(name, {(strength, k): k / degrees(1.0) for k in BRACES})
 
 
 def _worst_against_best(strength: float) -> Effect:
-    """Return how much more fibre work the dearest brace takes than the cheapest [%], as in the mean over episodes."""
+    """Return the effect: the change of fibre work from the cheapest to the dearest brace [%], at a calf's `strength`.
+
+    The two braces are those of the least and largest mean over episodes; NaN in all episodes if a brace has none.
+    """
 
     def effect(measured: Measured) -> NDArray:
+        """Return the change in each episode (E,)."""
         walks = [measured[strength, k][FIBRE] for k in BRACES]
         means = [float(np.nanmean(walk)) if np.isfinite(walk).any() else np.nan for walk in walks]
         if np.isnan(means).any():
@@ -124,16 +132,20 @@ def _worst_against_best(strength: float) -> Effect:
 
 
 def _saves_less_at_250(measured: Measured) -> bool:
-    """Return True if the exoskeleton saves less at 250 N m/rad than at 50."""
+    """Return True if, in the mean over episodes, the exoskeleton's fibre work is larger at 250 N m/rad than at 50."""
     dearer = measured[250.0][FIBRE] - measured[50.0][FIBRE]
     dearer = dearer[np.isfinite(dearer)]
     return bool(len(dearer) and dearer.mean() > 0.0)
 
 
-def _per_ankle_work_lost(of_a_step: Callable[[Mapping[str, NDArray]], NDArray]) -> Experiment:
-    """Return an experiment on plantarflexion stops: energy of a step for each joule of positive ankle work lost."""
+def _lost_ankle_work_experiment(of_a_step: Callable[[Mapping[str, NDArray]], NDArray]) -> Experiment:
+    """Return an experiment on plantarflexion stops: energy of a step for each joule of positive ankle work lost.
+
+    `of_a_step` returns that energy in each episode (E,) from a condition's numbers.
+    """
 
     def effect(measured: Measured) -> NDArray:
+        """Return the slope over the conditions in each episode (E,), > 0 if energy rises as ankle work falls."""
         walks = [measured[key] for key in _STOPS]
         return -slope([walk["ankle_positive_J_kg"] for walk in walks], [of_a_step(walk) for walk in walks])
 
@@ -142,33 +154,40 @@ def _per_ankle_work_lost(of_a_step: Callable[[Mapping[str, NDArray]], NDArray]) 
 
 
 def _number(name: str, key: Any, measured: Measured) -> NDArray:
-    """Return a number of a condition in each episode (E,)."""
+    """Return the number `name` under the condition `key` in each episode (E,)."""
     return measured[key][name]
 
 
-def _slope(of: str) -> Experiment:
-    """Return an experiment on fibre work on a slope, against level ground, with its split between joints."""
+def _slope_experiment(of: str) -> Experiment:
+    """Return an experiment on the slope `of` ("up" or "down"): fibre work less that on level ground, and its split
+    between joints."""
     split = {joint: difference(f"fibre_{joint}_J_kg_m", of, "level") for joint in JOINTS}
     conditions = {key: SLOPES[key] for key in ("level", of)}
     return Experiment(conditions=conditions, speed=1.3, effect=difference(FIBRE, of, "level"), beside=split)
 
 
-def _flexible_toe(name: str, **given: Any) -> Experiment:
-    """Return an experiment on a flexible toe against a locked one on level ground: the change of a number [%]."""
+def _flexible_toe_experiment(name: str, **fields: Any) -> Experiment:
+    """Return an experiment on a flexible toe against a locked one: the change of the number `name` [%].
+
+    It is on level ground at 1.2 m/s unless `fields` of `Experiment` say otherwise.
+    """
     return Experiment(
-        **{"conditions": _TOE, "speed": 1.2, "effect": change(name, "flexible", "locked")} | given,
+        **{"conditions": _TOE, "speed": 1.2, "effect": change(name, "flexible", "locked")} | fields,
     )
 
 
-def _stiff_foot(name: str, **given: Any) -> Experiment:
-    """Return an experiment on feet of fourfold bending stiffness: the change of a number [%]."""
+def _stiff_foot_experiment(name: str, **fields: Any) -> Experiment:
+    """Return an experiment on toes of fourfold stiffness: the change of the number `name` [%]; twofold ones beside it.
+
+    `fields` are further fields of `Experiment`.
+    """
     beside = {"× 2": change(name, 2.0, 1.0)}
     effect = change(name, 4.0, 1.0)
-    return Experiment(conditions=_STIFF, speed=1.25, effect=effect, beside=beside, note=_STIFF_NOTE, **given)
+    return Experiment(conditions=_STIFF, speed=1.25, effect=effect, beside=beside, note=_STIFF_NOTE, **fields)
 
 
-def _rough(name: str) -> Experiment:
-    """Return an experiment on uneven ground: the change of a number [%]."""
+def _rough_ground_experiment(name: str) -> Experiment:
+    """Return an experiment on uneven ground against even ground: the change of the number `name` [%]."""
     return Experiment(conditions=_ROUGH, speed=1.0, effect=change(name, "rough", "smooth"))
 
 
@@ -184,13 +203,17 @@ _WHOLE_STRIDE = "positive work over the stride, whose split by phase metrics lac
 _STROKE = "not run: its people had a stroke; no foot or person here is like theirs"
 
 EXPERIMENTS: dict[str, Experiment | str] = {
-    "afo_dorsiflexion": _weak(
-        _over_braces("dorsiflexion_deg"),
+    "afo_dorsiflexion": _weak_calf_experiment(
+        _slope_over_braces("dorsiflexion_deg"),
         walked=False,
         note="largest value of the mean curve in stance",
     ),
-    "afo_power": _weak(_over_braces("ankle_power_W_kg"), walked=False, note="largest value of the mean curve"),
-    "afo_range": _weak(_worst_against_best, at=1.05, note="at 1.05 m/s, as one brace does not reach 1.1"),
+    "afo_power": _weak_calf_experiment(
+        _slope_over_braces("ankle_power_W_kg"), walked=False, note="largest value of the mean curve"
+    ),
+    "afo_range": _weak_calf_experiment(
+        _worst_against_best, at=1.05, note="at 1.05 m/s, as one brace does not reach 1.1"
+    ),
     "exo_saving": Experiment(
         conditions=_EXO,
         speed=1.25,
@@ -198,13 +221,13 @@ EXPERIMENTS: dict[str, Experiment | str] = {
         beside={f"{k:g} N·m/rad": change(FIBRE, k, 0.0) for k in (100.0, 150.0, 250.0)},
         also={"less at 250 than at 50": _saves_less_at_250},
     ),
-    "toe_pushoff": _flexible_toe(
+    "toe_pushoff": _flexible_toe_experiment(
         "right_push_off_J_kg", note=f"locked is {LOCKED_TOE:g} N·m/rad; ankle and toe, {_WHOLE_STRIDE}"
     ),
-    "toe_com_pushoff": _flexible_toe("right_com_push_off_J_kg", note=f"locked is {LOCKED_TOE:g} N·m/rad"),
-    "stiff_foot_cost": _stiff_foot(FIBRE),
-    "slope_up": _slope("up"),
-    "slope_down": _slope("down"),
+    "toe_com_pushoff": _flexible_toe_experiment("right_com_push_off_J_kg", note=f"locked is {LOCKED_TOE:g} N·m/rad"),
+    "stiff_foot_cost": _stiff_foot_experiment(FIBRE),
+    "slope_up": _slope_experiment("up"),
+    "slope_down": _slope_experiment("down"),
     "load_cost": Experiment(conditions=LOADS, speed=1.25, effect=per_unit(FIBRE, _LOADS_KG, factor=1.25 * _BODY.mass)),
     "load_com_work": Experiment(
         conditions=LOADS,
@@ -223,11 +246,11 @@ EXPERIMENTS: dict[str, Experiment | str] = {
     ),
     "waist_mass": "not run: no setting puts a load at the waist",
     "ankle_k_falls": "not run: it has neither sign nor size; springfoot study identify shows it",
-    "pushoff_collision": _per_ankle_work_lost(lambda walk: walk["collision_J_kg"]),
-    "pushoff_joint_work": _per_ankle_work_lost(
+    "pushoff_collision": _lost_ankle_work_experiment(lambda walk: walk["collision_J_kg"]),
+    "pushoff_joint_work": _lost_ankle_work_experiment(
         lambda walk: np.sum([walk[f"{joint}_positive_J_kg"] for joint in JOINTS], axis=0)
     ),
-    "pushoff_cost": _per_ankle_work_lost(lambda walk: walk[FIBRE] * walk["step_length_m"]),
+    "pushoff_cost": _lost_ankle_work_experiment(lambda walk: walk[FIBRE] * walk["step_length_m"]),
     "rigid_both_cost": Experiment(
         conditions={_SOUND: {}, "rigid": both("rigid")}, speed=1.25, effect=change(FIBRE, "rigid", _SOUND)
     ),
@@ -243,9 +266,9 @@ EXPERIMENTS: dict[str, Experiment | str] = {
         walked=False,
         effect=change("knee_moment_Nm_kg", 0.35, 0.0),
     ),
-    "rough_cost": _rough(FIBRE),
-    "rough_hip_work": _rough("hip_positive_J_kg"),
-    "rough_knee_work": _rough("knee_negative_J_kg"),
+    "rough_cost": _rough_ground_experiment(FIBRE),
+    "rough_hip_work": _rough_ground_experiment("hip_positive_J_kg"),
+    "rough_knee_work": _rough_ground_experiment("knee_negative_J_kg"),
     "toe_slope_pushoff": Experiment(
         conditions=_TOE_ONSLOPES,
         speed=1.1,
@@ -260,7 +283,7 @@ EXPERIMENTS: dict[str, Experiment | str] = {
         effect=difference("right_knee_at_toe_off_deg", ("flexible", 5.0), ("locked", 5.0)),
         note="the mean curve at toe-off",
     ),
-    "toe_rough_hip": _flexible_toe("right_hip_net_J_kg", conditions=_TOE_ON_ROUGH, speed=1.0),
+    "toe_rough_hip": _flexible_toe_experiment("right_hip_net_J_kg", conditions=_TOE_ON_ROUGH, speed=1.0),
     "exo_ankle_moment": Experiment(
         conditions={k: _EXO[k] for k in (0.0, 50.0)},
         speed=1.25,
@@ -268,8 +291,8 @@ EXPERIMENTS: dict[str, Experiment | str] = {
         effect=change("ankle_fibres_Nm", 50.0, 0.0),
         note="largest value of the mean curve of the recorded fibre_moment",
     ),
-    "stiff_foot_loss": _stiff_foot("toe_negative_J_kg"),
-    "stiff_foot_force": _stiff_foot("ankle_moment_Nm_kg", walked=False),
+    "stiff_foot_loss": _stiff_foot_experiment("toe_negative_J_kg"),
+    "stiff_foot_force": _stiff_foot_experiment("ankle_moment_Nm_kg", walked=False),
     "afo_knee_extension": Experiment(
         conditions=_HINGES,
         speed=0.8,
@@ -290,19 +313,19 @@ EXPERIMENTS: dict[str, Experiment | str] = {
         note="for each m/s commanded",
     ),
     "slope_trailing": Experiment(
-        conditions=_grades(0.0, 3.0, 5.0),
+        conditions=_slope_conditions(0.0, 3.0, 5.0),
         speed=1.25,
         effect=per_unit("push_off_J_kg", {0.0: 0.0, 3.0: 3.0, 5.0: 5.0}),
         note="for each degree",
     ),
     "slope_leading": Experiment(
-        conditions=_grades(0.0, -3.0, -5.0),
+        conditions=_slope_conditions(0.0, -3.0, -5.0),
         speed=1.25,
         effect=per_unit("collision_J_kg", {0.0: 0.0, -3.0: 3.0, -5.0: 5.0}),
         note="for each degree",
     ),
     "slope_hip_share": Experiment(
-        conditions=_grades(-5.0, 0.0, 5.0),
+        conditions=_slope_conditions(-5.0, 0.0, 5.0),
         speed=1.25,
         effect=per_unit("hip_share", {-5.0: -5.0, 0.0: 0.0, 5.0: 5.0}),
         note="derived from the mean curves of power in stance",

@@ -44,7 +44,8 @@ again."""
 
 
 def episode_walks(study: PersonsStudy) -> ConditionWalks:
-    """Return how a study of persons walks under conditions, with the numbers of each episode."""
+    """Return the walks of a study of persons under conditions: measured by `numbers_by_episode`, and kept in the file
+    of the study's flag `keep`."""
     return ConditionWalks(
         study=study,
         measured=lambda recording: {"episodes": numbers_by_episode(recording)},
@@ -57,8 +58,10 @@ def episode_walks(study: PersonsStudy) -> ConditionWalks:
 def walked_rows(
     under: ConditionWalks, person: str, walks: Sequence[tuple[Any, Mapping[str, Any]]], progress: OnProgress
 ) -> list[dict[str, Any]]:
-    """Return a row for each of a person's walks (condition, settings with a `speed`) and each episode: `condition`,
-    `episode`, `speed_m_s` (commanded), and the numbers."""
+    """Walk a person under each of `walks` (condition, settings with a `speed`), unless `under` keeps the walk.
+
+    Return a row for each walk and episode: `condition`, `episode`, `speed_m_s` (commanded), `falls`, `EFFECT_NUMBERS`.
+    """
     numbers = under.walk(person, [given for _, given in walks], progress)
     return [
         {"condition": condition, "episode": episode, "speed_m_s": given["speed"], **measured}
@@ -68,21 +71,22 @@ def walked_rows(
 
 
 def numbers_by_episode(recording: Recording) -> list[dict[str, float | None]]:
-    """Return `EFFECT_NUMBERS` and `falls`, 1 for a fall, of each episode; after a fall the numbers are None."""
-    return [_numbers_of(recording.of_episode(index)) for index in range(len(recording.ticks))]
+    """Return `falls` (1 for a fall) and `EFFECT_NUMBERS` of each episode; the latter are None if it ended in a fall, or
+    if a leg took no stride."""
+    return [_episode_numbers(recording.of_episode(index)) for index in range(len(recording.ticks))]
 
 
-def _numbers_of(recording: Recording) -> dict[str, float | None]:
-    """Return the numbers of a recording of one episode."""
+def _episode_numbers(recording: Recording) -> dict[str, float | None]:
+    """Return the numbers of `numbers_by_episode` for a recording of one episode."""
     gait = measure(recording)
     fell = float(gait.metrics["falls"])
     if fell or not all(foot.count for foot in gait.feet):
         return {"falls": fell} | dict.fromkeys(EFFECT_NUMBERS)
-    return {"falls": fell} | _of_both_legs(gait, recording) | _of_the_right_leg(gait)
+    return {"falls": fell} | _both_legs_numbers(gait, recording) | _right_leg_numbers(gait)
 
 
-def _of_both_legs(gait: Gait, recording: Recording) -> dict[str, float | None]:
-    """Return the numbers of both legs together."""
+def _both_legs_numbers(gait: Gait, recording: Recording) -> dict[str, float | None]:
+    """Return the entries of `EFFECT_NUMBERS` that are of the whole body, or means of both legs."""
     metrics = gait.metrics
     effort = metrics["effort"]
     body = body_of(recording.settings)
@@ -107,14 +111,14 @@ def _of_both_legs(gait: Gait, recording: Recording) -> dict[str, float | None]:
         "dorsiflexion_deg": float(curves.mean("ankle_dorsiflexion_deg")[stance].max()),
         "ankle_power_W_kg": float(curves.mean("ankle_power_W_per_kg").max()),
         **{f"{joint}_moment_Nm_kg": metrics["moments"][joint]["peak_Nm_kg"] for joint in ("ankle", "knee")},
-        "ankle_fibres_Nm": float(_ankle_fibres(recording).max()),
+        "ankle_fibres_Nm": float(_ankle_fibre_moment(recording).max()),
         "knee_loading_deg": float(knee[metrics["toe_off_percent"] / 2 >= PERCENT].max()),  # flexion, as below
         "knee_swing_deg": float(knee[~stance].max()),
     }
 
 
-def _of_the_right_leg(gait: Gait) -> dict[str, float | None]:
-    """Return the numbers of the right leg, and how much higher the left toe clears the ground."""
+def _right_leg_numbers(gait: Gait) -> dict[str, float | None]:
+    """Return the entries of `EFFECT_NUMBERS` that are of the right leg, or compare the clearance of both toes."""
     legs = leg_numbers(gait.tally)
     left, right = (legs[side] for side in SIDES)
     work = right["joint_work_J_kg"]
@@ -133,8 +137,8 @@ def _of_the_right_leg(gait: Gait) -> dict[str, float | None]:
 def com_power(gait: Gait) -> NDArray:
     """Return the power of one leg's ground force on the CoM over percent of the stride, 0 to 99, (100,) [W/kg].
 
-    It is of mean curves, of both legs: the CoM's velocity over the step, twice a stride, and the force over the stride.
-    On level ground alone, with legs alike.
+    The force is the mean curve of both legs over the stride, the CoM's velocity its mean curve over the step, twice in
+    a stride. It holds on level ground alone, with both legs alike.
     """
     step_seconds = 60.0 / gait.metrics["cadence_steps_min"]
     over_step = 2 * np.arange(100) % 100  # percent of the step at each percent of the stride
@@ -150,7 +154,7 @@ def _hip_share(gait: Gait, stance: NDArray) -> float:
     return float(work["hip"] / sum(work.values()))
 
 
-def _ankle_fibres(recording: Recording) -> NDArray:
+def _ankle_fibre_moment(recording: Recording) -> NDArray:
     """Return the mean curve of the moment of the ankles' muscle fibres over percent of the stride (101,) [N m]."""
     series = recording.shown()
     contacts = foot_contacts(series["force"][..., 1].sum(axis=2), body_of(recording.settings))

@@ -64,7 +64,7 @@ class Effects(PersonsStudy):
         return len(self.persons) * len(walks) * self.episodes * self.seconds
 
     def ask(self, progress: OnProgress) -> Answer:
-        """Walk every person in every experiment."""
+        """Walk every person in the experiment of every effect; hold the measured effects against the published ones."""
         under = episode_walks(self)
         rows = []
         for published in published_effects():
@@ -79,7 +79,7 @@ class Effects(PersonsStudy):
         return Answer(text=self._text(rows), files={"effects.csv": rows_csv(rows)})
 
     def _text(self, rows: Sequence[Row]) -> str:
-        """Return the report."""
+        """Return the report from rows of `effect_row`: verdict, table of the effects walked, reasons for the others."""
         not_run = [f"- {row['effect']}: {row['note'].removeprefix('not run: ')}." for row in rows if not row["run"]]
         without = [f"Not run:\n\n{chr(10).join(not_run)}"] if not_run else []
         return "\n\n".join(
@@ -102,7 +102,8 @@ def published_effects() -> list[dict[str, str]]:
 
 
 def walks_of(experiment: Experiment) -> list[tuple[Any, dict[str, Any]]]:
-    """Return the condition and the settings of each walk of an experiment."""
+    """Return the condition and the settings of each walk of an experiment: each condition at the commanded speed, or
+    `AROUND` it where conditions are compared at one walked speed."""
     around = AROUND if experiment.walked else (0.0,)
     return [
         (condition, {"speed": round(experiment.speed + more, 6), **given})
@@ -111,7 +112,10 @@ def walks_of(experiment: Experiment) -> list[tuple[Any, dict[str, Any]]]:
 
 
 def measured_of(experiment: Experiment, walks: Sequence[Row]) -> Measured:
-    """Return the numbers of each condition and episode: where all walk as fast, or as commanded."""
+    """Return the numbers of each condition and episode from one person's rows of `walked_rows`.
+
+    With `experiment.walked` they are interpolated to one walked speed.
+    """
     if experiment.walked:
         speed = experiment.speed if experiment.at is None else experiment.at
         walks = at_walked_speeds(walks, ("condition", "episode"), (speed,), EFFECT_NUMBERS)
@@ -123,8 +127,8 @@ def effect_row(
 ) -> dict[str, Any]:
     """Return the row of an effect: published, measured, and how the two agree.
 
-    `walks` are those of each person, as of `Effects`; none for an experiment that is not run. Episodes count in which
-    no condition falls.
+    `walks` is person -> rows of `walked_rows`, empty for an experiment that is not run. An episode counts if no
+    condition falls in it.
     """
     columns = ("seen", "people", "sign", "size", "unit", "tolerance")
     row: dict[str, Any] = {"effect": published["name"], **{name: published[name] or None for name in columns}}
@@ -136,13 +140,15 @@ def effect_row(
         return row | {"beside": None, "note": experiment} | (dict.fromkeys(walks) if len(walks) > 1 else {})
     measured = {person: measured_of(experiment, own) for person, own in walks.items()}
     with np.errstate(invalid="ignore", divide="ignore"):
-        values = {person: _known(experiment.effect(numbers)) for person, numbers in measured.items()}
-        efforts = {person: _known(experiment.effect(_with_effort(numbers))) for person, numbers in measured.items()}
+        values = {person: _finite_values(experiment.effect(numbers)) for person, numbers in measured.items()}
+        efforts = {
+            person: _finite_values(experiment.effect(_with_effort(numbers))) for person, numbers in measured.items()
+        }
         beside = {
-            name: _mean([_known(effect(numbers)) for numbers in measured.values()])
+            name: _mean([_finite_values(effect(numbers)) for numbers in measured.values()])
             for name, effect in experiment.beside.items()
         }
-    notes = [experiment.note, *_falls(walks.values())]
+    notes = [experiment.note, *_falls_by_condition(walks.values())]
     if all(map(len, values.values())):
         pairs = np.concatenate(list(values.values()))
         low, high = mean_interval(pairs) if len(pairs) > 1 else (None, None)
@@ -157,38 +163,45 @@ def effect_row(
         if any(not np.array_equal(values[person], efforts[person]) for person in values):  # the effect is of energy
             row["effort"] = _mean(list(efforts.values()))
     else:
-        notes.append(": ".join(["no episode has all numbers", *_without_numbers(measured.values(), walks.values())]))
-    row |= {"walked_m_s": _walked(measured.values()), "falls": _share([one for own in walks.values() for one in own])}
-    row |= {"beside": "; ".join(f"{name} {_text(value)}" for name, value in beside.items()) or None}
+        notes.append(
+            ": ".join(["no episode has all numbers", *_conditions_without_numbers(measured.values(), walks.values())])
+        )
+    row |= {
+        "walked_m_s": _walked_speed_range(measured.values()),
+        "falls": _falls_text([one for own in walks.values() for one in own]),
+    }
+    row |= {"beside": "; ".join(f"{name} {_number_text(value)}" for name, value in beside.items()) or None}
     row |= {"note": "; ".join(filter(None, notes)) or None}
     return row | ({person: _mean([own]) for person, own in values.items()} if len(values) > 1 else {})
 
 
 def _with_effort(measured: Measured) -> Measured:
-    """Return the numbers with all of the effort in the place of fibre work."""
+    """Return the numbers with all of the effort as their fibre work, so that an effect of it is one of the effort."""
     return {key: {**numbers, FIBRE: numbers[ALL_EFFORT]} for key, numbers in measured.items()}
 
 
-def _known(values: NDArray) -> NDArray:
+def _finite_values(values: NDArray) -> NDArray:
     """Return the values that are finite."""
     return values[np.isfinite(values)]
 
 
 def _mean(values: Sequence[NDArray]) -> float | None:
-    """Return the mean of several persons' values; None without any."""
+    """Return the mean of all persons' values together; None without any."""
     together = np.concatenate(values)
     return float(together.mean()) if len(together) else None
 
 
-def _walked(measured: Any) -> str:
-    """Return the walked speeds of the conditions in words [m/s]."""
-    speeds = [float(np.mean(known)) for one in measured for key in one if len(known := _known(one[key]["walked_m_s"]))]
+def _walked_speed_range(measured: Iterable[Measured]) -> str:
+    """Return the least and the largest of the conditions' mean walked speeds [m/s], as in "1.10 to 1.24"; a dash
+    without any. `measured` has an entry for each person."""
+    of_conditions = [_finite_values(numbers["walked_m_s"]) for of_person in measured for numbers in of_person.values()]
+    speeds = [float(np.mean(of_episodes)) for of_episodes in of_conditions if len(of_episodes)]
     return " to ".join(dict.fromkeys(f"{end:.2f}" for end in (min(speeds), max(speeds)))) if speeds else MISSING
 
 
-def _without_numbers(measured: Iterable[Measured], walks: Iterable[Sequence[Row]]) -> list[str]:
-    """Return one sentence on the conditions of which no episode of a person has a fibre work, and the speeds that they
-    walk; none where each condition has one in some episode.
+def _conditions_without_numbers(measured: Iterable[Measured], walks: Iterable[Sequence[Row]]) -> list[str]:
+    """Return a list of one sentence: the conditions in which some person has no episode with a fibre work, and the
+    speeds that they walk. The list is empty without such a condition.
 
     `measured` and `walks` have an entry for each person.
     """
@@ -197,7 +210,7 @@ def _without_numbers(measured: Iterable[Measured], walks: Iterable[Sequence[Row]
         condition
         for of_person in measured
         for condition, numbers in of_person.items()
-        if not len(_known(numbers[FIBRE]))
+        if not len(_finite_values(numbers[FIBRE]))
     )
     clauses = []
     for condition in missing:
@@ -208,19 +221,20 @@ def _without_numbers(measured: Iterable[Measured], walks: Iterable[Sequence[Row]
     return [", ".join(clauses)] if clauses else []
 
 
-def _share(walks: Sequence[Row]) -> str:
-    """Return how many of the episodes fell, as in "2 of 20"."""
+def _falls_text(walks: Sequence[Row]) -> str:
+    """Return the number of rows whose episode fell, as in "2 of 20"."""
     return f"{sum(int(walk['falls']) for walk in walks)} of {len(walks)}"
 
 
-def _falls(walks: Any) -> list[str]:
-    """Return, in words, the conditions in which somebody falls."""
+def _falls_by_condition(walks: Iterable[Sequence[Row]]) -> list[str]:
+    """Return a sentence on the falls in each condition and commanded speed in which an episode falls; `walks` are rows
+    of `walked_rows` for each person."""
     by_walk: dict[tuple[Any, float], list[Row]] = {}
     for own in walks:
         for walk in own:
             by_walk.setdefault((walk["condition"], walk["speed_m_s"]), []).append(walk)
     return [
-        f"falls {_share(rows)} in {_label(key)} at {speed:g} m/s"
+        f"falls {_falls_text(rows)} in {_label(key)} at {speed:g} m/s"
         for (key, speed), rows in by_walk.items()
         if any(row["falls"] for row in rows)
     ]
@@ -235,7 +249,8 @@ def _label(key: Any) -> str:
 
 
 def sign_is(sign: str, low: float | None, high: float | None) -> str | None:
-    """Return whether an effect with the interval `low` to `high` has the published `sign`; None without one."""
+    """Return "right", "wrong" or `UNCLEAR` for an effect with the interval `low` to `high`, held against the published
+    `sign` + or -; None without a published sign."""
     if not sign:
         return None
     if low is None or high is None or low <= 0.0 <= high:
@@ -244,9 +259,9 @@ def sign_is(sign: str, low: float | None, high: float | None) -> str | None:
 
 
 def size_within(published: Mapping[str, str], measured: float, also: Mapping[str, bool]) -> int | None:
-    """Return 1 if a measured effect is within the published tolerance, else 0; None where that has no size.
+    """Return 1 if a measured effect is within the published tolerance, else 0; None if that is "sign only".
 
-    `also` tells of each further clause of the tolerance whether it holds. Raises `SpringfootError` for a clause that is
+    `also` is, for each further clause of the tolerance, True if it holds. Raises `SpringfootError` for a clause that is
     not understood.
     """
     first, *clauses = published["tolerance"].split("; ")
@@ -265,7 +280,7 @@ def size_within(published: Mapping[str, str], measured: float, also: Mapping[str
 
 
 def verdict(rows: Sequence[Row]) -> str:
-    """Return how many signs are right and how many sizes within, of effects seen before and of the others.
+    """Return a sentence with the numbers of right signs and of sizes within, of effects seen before and of the others.
 
     An effect that was walked and has no number counts as missed.
     """
@@ -290,16 +305,16 @@ def effects_table(rows: Sequence[Row]) -> str:
         published = f"{row['sign'] or ''} {row['size'] or ''} {row['unit'] or ''}".strip()
         if row["size"]:
             published = f"{row['size']} {row['unit']}"
-        interval = "" if row["low"] is None else f" ({_text(row['low'])} to {_text(row['high'])})"
+        interval = "" if row["low"] is None else f" ({_number_text(row['low'])} to {_number_text(row['high'])})"
         lines.append(
             [
                 row["effect"],
                 row["seen"],
                 published,
-                f"{_text(row['measured'])}{interval}",
+                f"{_number_text(row['measured'])}{interval}",
                 row["sign_is"] or MISSING,
                 {1: "yes", 0: "no"}.get(row["size_within"], MISSING),
-                _text(row["effort"]),
+                _number_text(row["effort"]),
                 row["walked_m_s"],
                 row["falls"],
             ]
@@ -308,6 +323,6 @@ def effects_table(rows: Sequence[Row]) -> str:
     return table(head, lines)
 
 
-def _text(value: float | None) -> str:
-    """Return a number with three digits."""
+def _number_text(value: float | None) -> str:
+    """Return a number with three significant digits; a dash for None."""
     return MISSING if value is None else f"{value:.3g}".replace("-", "−")

@@ -38,21 +38,22 @@ LABORATORY_COLUMNS = (
 
 
 def laboratory_table(name: str, walks: Mapping[str, Mapping[str, Any]]) -> str:
-    """Return the Markdown table of the policy `name`, from the metrics of its walk under each condition."""
+    """Return the Markdown table of the policy `name`, from the metrics of its walk under each condition, the usual one
+    first: numbers, and in brackets their changes from the usual walk."""
     usual, *_ = walks.values()
     lines = []
     for words, metrics in walks.items():
         cells = []
         for column in LABORATORY_COLUMNS:
             value, before = column.of(metrics), column.of(usual)
-            known = metrics is not usual and value is not None and before
-            cells.append(text_of(value, column.pattern) + (f" ({value / before - 1.0:+.0%})" if known else ""))
+            has_change = metrics is not usual and value is not None and before
+            cells.append(text_of(value, column.pattern) + (f" ({value / before - 1.0:+.0%})" if has_change else ""))
         lines.append([words, falls_text(metrics), *cells])
     return table([f"`{name}`", "falls", *(column.label for column in LABORATORY_COLUMNS)], lines)
 
 
 def laboratory_csv(walks: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> str:
-    """Return the CSV with a line for each policy and condition, from metrics."""
+    """Return the CSV with a line for each policy and condition; `walks` is policy -> condition -> metrics."""
     return walks_csv(
         [
             (

@@ -112,7 +112,10 @@ class Score(MotionFiles):
 
 
 def curves_by_side(measured: MeasuredPerson) -> dict[str, dict[str, NDArray]]:
-    """Return left, right and both -> curve -> its mean (101,) over the strides that count; sides that were read."""
+    """Return side (left, right, both) -> curve -> its mean (101,) over the strides that count.
+
+    Sides and curves without such a stride are left out, and "both" if only one leg has any.
+    """
     strides: dict[str, dict[str, list[NDArray]]] = {}
     for side, leg in measured.legs.items():
         for curve in CURVES.keys() & leg.curves.keys():
@@ -128,7 +131,8 @@ def curves_by_side(measured: MeasuredPerson) -> dict[str, dict[str, NDArray]]:
 
 
 def peoples_numbers(human: HumanGait) -> dict[str, dict[str, float | None]]:
-    """Return people's own numbers: the peaks of their mean curves, and for each RMSE their SD's root mean square."""
+    """Return the numbers of people's mean curves: peaks and valley, for an angle's RMSE the root mean square of
+    people's SD, and None for all others."""
     phase = PERCENT / 100
     numbers = gait_numbers({curve: human.mean(curve, phase) for curve in CURVES}, human)
     for curve, of_curve in numbers.items():
@@ -139,7 +143,7 @@ def peoples_numbers(human: HumanGait) -> dict[str, dict[str, float | None]]:
 
 
 def verdict(numbers: Scores, human: HumanGait) -> str:
-    """Return the answer in a sentence."""
+    """Return a sentence with the RMSE of each angle and r of the vertical force, from the `numbers` of one side."""
     angles = [f"{joint} {numbers[joint]['rmse_deg']:.1f}°" for joint in ANGLE_JOINTS if joint in numbers]
     parts = [f"{', '.join(angles)} rms from people's mean"] if angles else []
     r = numbers.get("grf", {}).get("vertical_r")
@@ -173,7 +177,7 @@ def scores_csv(numbers: Mapping[str, Scores], people: Scores) -> str:
 
 
 def beside(numbers: Scores, speed: float | None) -> str:
-    """Return the table of this gait beside published simulations."""
+    """Return the Markdown table of one side's `numbers` and walking `speed` [m/s] beside published simulations."""
 
     def mean(name: str) -> float | None:
         """Return a number's mean over `COMPARED`; None unless each is there."""

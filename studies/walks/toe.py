@@ -8,7 +8,7 @@ ankles the toe's spring is all it has, as in a prosthesis (McDonald et al. 2021)
 compared where they walk equally fast, so a price is that of the kept speed.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Any, NamedTuple
@@ -93,23 +93,25 @@ class ToeJoint(PersonsStudy):
     @property
     def total(self) -> float:
         """Return the simulated time of all walks if none falls [s]."""
-        return len(self.persons) * len(TOES) * len(self._asked()) * self.episodes * self.seconds
+        return len(self.persons) * len(TOES) * len(self._commanded_speeds()) * self.episodes * self.seconds
 
     def ask(self, progress: OnProgress) -> Answer:
-        """Walk every person on every toe."""
+        """Walk every person on every toe at every commanded speed; compare the toes at equal walked speed."""
         under = episode_walks(self)
-        asked = [(toe, {**given, "speed": speed}) for (toe, given), speed in product(TOES.items(), self._asked())]
+        asked = [
+            (toe, {**given, "speed": speed}) for (toe, given), speed in product(TOES.items(), self._commanded_speeds())
+        ]
         walks = {person: list(map(with_foot, walked_rows(under, person, asked, progress))) for person in self.persons}
         speeds = (0.9,) if self.quick else WALKED_SPEEDS
         even = {speed: {person: toes_at_speed(speed, own) for person, own in walks.items()} for speed in speeds}
         compared = [row for speed, measured in even.items() for row in compared_rows(speed, measured)]
         shown = speeds[len(speeds) // 2]
         beside = [row for speed, measured in even.items() for row in beside_rows(speed, measured)]
-        command = COMMAND if COMMAND in self._asked() else max(self._asked())
+        command = COMMAND if COMMAND in self._commanded_speeds() else max(self._commanded_speeds())
         files = {
             "toe.csv": rows_csv(compared),
             "published.csv": rows_csv(beside),
-            "walks.csv": rows_csv([_labelled(person, row) for person, own in walks.items() for row in own]),
+            "walks.csv": rows_csv([_csv_row(person, row) for person, own in walks.items() for row in own]),
         }
         everyone = [row for own in walks.values() for row in own]
         parts = [
@@ -121,8 +123,8 @@ class ToeJoint(PersonsStudy):
         return Answer(text="\n\n".join(parts), files=files)
 
     def _note(self, shown: float) -> str:
-        """Return the words below the tables, of walks at `shown` m/s."""
-        asked = ", ".join(f"{speed:g}" for speed in self._asked())
+        """Return the paragraph below the tables, which show the toes at the walked speed `shown` [m/s]."""
+        asked = ", ".join(f"{speed:g}" for speed in self._commanded_speeds())
         return (
             f"Both feet, walking {shown:g} m/s; in brackets the difference from the free toe, with passive ankles from "
             "the locked one, and its 95 % interval over persons and starts: of one person it tells how starts differ, "
@@ -133,13 +135,13 @@ class ToeJoint(PersonsStudy):
             "180: where locked is far from a spring of 1000, suspect the person, not the toe."
         )
 
-    def _asked(self) -> Sequence[float]:
+    def _commanded_speeds(self) -> Sequence[float]:
         """Return the commanded speeds [m/s]."""
         return ASKED_SPEEDS[:2] if self.quick else ASKED_SPEEDS
 
 
 def with_foot(row: Row) -> dict[str, Any]:
-    """Return a row of `walked_rows` with the number `FOOT_WORK`."""
+    """Return a row of `walked_rows` with the number `FOOT_WORK` added; None if the work of ankle or toe is."""
     parts = [row[f"{joint}_positive_J_kg"] for joint in ("ankle", "toe")]
     return {**row, FOOT_WORK: None if None in parts else sum(parts)}
 
@@ -151,11 +153,11 @@ def toes_at_speed(speed: float, walks: Sequence[Row]) -> Measured:
 
 
 def compared_rows(speed: float, measured: Mapping[str, Measured]) -> list[dict[str, Any]]:
-    """Return a row for each toe and number of `NUMBERS` at a walked `speed` [m/s], of persons' numbers by toe.
+    """Return a row for each toe and number of `NUMBERS` at a walked `speed` [m/s].
 
-    It has the mean, the difference from the toe it is compared with (`AGAINST`) and its 95 % interval, the smallest
-    difference that so many pairs show, their number, and of several persons each one's difference. None where no pair
-    walks.
+    `measured` is person -> numbers of `toes_at_speed`. A row has the number's mean, and the numbers of
+    `_paired_numbers` for the difference from the toe that it is compared with (`AGAINST`), also in percent; None
+    without an episode in which both have the number.
     """
     rows = []
     for toe, number in product(TOES, NUMBERS):
@@ -163,39 +165,46 @@ def compared_rows(speed: float, measured: Mapping[str, Measured]) -> list[dict[s
         apart = difference(number, toe, against)
         relative = change(number, toe, against)
         row = {**toe._asdict(), "speed_m_s": speed, "number": number}
-        row |= {"mean": _mean(_known(lambda one, toe=toe, number=number: one[toe][number], measured.values()))}
-        rows.append(row | _paired(apart, measured) | {"percent": _mean(_known(relative, measured.values()))})
-    return rows
-
-
-def beside_rows(speed: float, measured: Mapping[str, Measured]) -> list[dict[str, Any]]:
-    """Return a row for each effect of `BESIDE` at a walked `speed` [m/s]: published, here [%], and whether the sign is
-    right."""
-    published = {row["name"]: row for row in published_effects()}
-    rows = []
-    for name, effect in BESIDE.items():
-        paired = _paired(effect, measured)
-        known = {key: published[name][key] or None for key in ("source", "sign", "size", "unit")}
-        sign = sign_is(published[name]["sign"], paired["low"], paired["high"])
+        row |= {
+            "mean": _mean(
+                _finite_values(lambda numbers, toe=toe, number=number: numbers[toe][number], measured.values())
+            )
+        }
         rows.append(
-            {"effect": name, **known, "speed_m_s": speed, **paired, "sign_is": sign if paired["pairs"] else None}
+            row | _paired_numbers(apart, measured) | {"percent": _mean(_finite_values(relative, measured.values()))}
         )
     return rows
 
 
-def _paired(effect: Effect, measured: Mapping[str, Measured]) -> dict[str, Any]:
-    """Return the mean of an effect over persons and episodes, its 95 % interval, the smallest visible one, the number
-    of pairs, and of several persons each one's mean."""
-    values = _known(effect, measured.values())
+def beside_rows(speed: float, measured: Mapping[str, Measured]) -> list[dict[str, Any]]:
+    """Return a row for each effect of `BESIDE` at a walked `speed` [m/s]: as published, as here [%], and the agreement
+    of the signs (`sign_is`). `measured` as of `compared_rows`."""
+    published = {row["name"]: row for row in published_effects()}
+    rows = []
+    for name, effect in BESIDE.items():
+        paired = _paired_numbers(effect, measured)
+        of_people = {key: published[name][key] or None for key in ("source", "sign", "size", "unit")}
+        sign = sign_is(published[name]["sign"], paired["low"], paired["high"])
+        rows.append(
+            {"effect": name, **of_people, "speed_m_s": speed, **paired, "sign_is": sign if paired["pairs"] else None}
+        )
+    return rows
+
+
+def _paired_numbers(effect: Effect, measured: Mapping[str, Measured]) -> dict[str, Any]:
+    """Return the mean of an effect over all pairs (a person's episode under both conditions), its 95 % interval, the
+    smallest effect that so many pairs would show (`visible`), the number of pairs, and for several persons the mean of
+    each."""
+    values = _finite_values(effect, measured.values())
     low, high = mean_interval(values) if len(values) > 1 else (None, None)
-    own = {person: _mean(_known(effect, [numbers])) for person, numbers in measured.items()}
+    own = {person: _mean(_finite_values(effect, [numbers])) for person, numbers in measured.items()}
     seen = visible(values)
     row = {"difference": _mean(values), "low": low, "high": high, "visible": seen, "pairs": len(values)}
     return row | (own if len(own) > 1 else {})
 
 
-def _known(effect: Effect, measured: Any) -> NDArray:
-    """Return the values of an effect that are known, of several persons' numbers, (pairs,)."""
+def _finite_values(effect: Effect, measured: Iterable[Measured]) -> NDArray:
+    """Return the finite values (pairs,) of an effect, over the episodes of all persons; the others are left out."""
     with np.errstate(invalid="ignore", divide="ignore"):  # a number that is 0, such as the work of a locked toe
         values = np.concatenate([effect(numbers) for numbers in measured])
     return values[np.isfinite(values)]
@@ -206,14 +215,17 @@ def _mean(values: NDArray) -> float | None:
     return float(values.mean()) if len(values) else None
 
 
-def _labelled(person: str, row: Row) -> dict[str, Any]:
-    """Return a walk's row for its CSV: person and toe first, then the rest."""
+def _csv_row(person: str, row: Row) -> dict[str, Any]:
+    """Return a row of `walked_rows` for walks.csv: person and toe first, then the rest."""
     return {"person": person, **row["condition"]._asdict(), **{k: v for k, v in row.items() if k != "condition"}}
 
 
 def verdict(compared: Sequence[Row], beside: Sequence[Row], speed: float) -> str:
-    """Return the answer in a sentence: what locked and absent toes change at a walked `speed`, and how many published
-    directions are met there."""
+    """Return a sentence with the changes by locked and absent toes at a walked `speed` [m/s], and with the number of
+    published directions that are met there.
+
+    `compared` are rows of `compared_rows`, `beside` of `beside_rows`.
+    """
     told = []
     for toe in (TOE_LOCKED, TOE_ABSENT):
         here = {row["number"]: row for row in compared if _is_toe(row, Toe(SOUND_ANKLES, toe), speed)}
@@ -235,8 +247,11 @@ def _is_toe(row: Row, toe: Toe, speed: float) -> bool:
 
 
 def toe_table(compared: Sequence[Row], walks: Sequence[Row], speed: float, command: float) -> str:
-    """Return the Markdown table of the toes: falls, the speed walked at a `command`, and the numbers at a walked
-    `speed` with their differences."""
+    """Return the Markdown table of the toes: falls, the mean speed walked at `command` [m/s], and `NUMBERS` at a walked
+    `speed` [m/s] with their differences.
+
+    `compared` are rows of `compared_rows`, `walks` rows of `with_foot` of all persons.
+    """
     lines = []
     for toe in TOES:
         own = [row for row in walks if row["condition"] == toe]
@@ -249,7 +264,8 @@ def toe_table(compared: Sequence[Row], walks: Sequence[Row], speed: float, comma
 
 
 def _cell(row: Row, form: str) -> str:
-    """Return a number with its difference from the toe it is compared with."""
+    """Return the mean of a row of `compared_rows`, and in brackets its difference from the toe that it is compared
+    with, with the interval."""
     if row["toe"] == AGAINST[row["ankles"]] or row["difference"] is None:
         return text_of(row["mean"], form)
     ends = "" if row["low"] is None else f" [{row['low']:+{form}}, {row['high']:+{form}}]"
@@ -257,7 +273,7 @@ def _cell(row: Row, form: str) -> str:
 
 
 def beside_table(beside: Sequence[Row]) -> str:
-    """Return the Markdown table of published effects beside those here."""
+    """Return the Markdown table of published effects beside those here, from rows of `beside_rows`."""
     lines = []
     for row in beside:
         ends = "" if row["low"] is None else f" ({row['low']:+.1f} to {row['high']:+.1f})"
