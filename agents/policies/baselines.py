@@ -45,8 +45,10 @@ def leg_phase(observation: NDArray) -> NDArray:
 
 
 def constant(settings: BipedSettings, stiffness: ArrayLike = CONSTANT_STIFFNESS) -> PolicyFunction:
-    """Return the policy of one constant `stiffness` (ankle, toe) [N m/rad], given for 1.70 m and 63 kg and scaled with
-    the body."""
+    """Return the policy that always sets the same K of ankle and toe, at both legs and every phase.
+
+    `stiffness` (ankle, toe) [N m/rad] is that of a body of 1.70 m and 63 kg, and is scaled to the body of `settings`.
+    """
     body = body_of(settings)
     require_absolute(settings)
     scaled = np.asarray(stiffness, float) * body.stiffness_scale
@@ -56,22 +58,23 @@ def constant(settings: BipedSettings, stiffness: ArrayLike = CONSTANT_STIFFNESS)
 
 def untrained(settings: BipedSettings) -> PolicyFunction:
     """Return the policy with which training starts: action 0, the middle of the stiffness range on its log scale, or
-    in residual mode the fixed schedule."""
+    in residual mode the K of the schedule that an action multiplies."""
     return lambda observation: np.zeros((len(observation), len(ACTIONS)), np.float32)
 
 
 def uniform(settings: BipedSettings, seed: int = 0) -> PolicyFunction:
-    """Return the policy that draws every action from the whole range; one generator, seeded with `seed`, serves all
+    """Return the policy that draws every action uniformly from [-1, 1]; one generator, seeded with `seed`, serves all
     calls."""
     generator = np.random.default_rng(seed)
     return lambda observation: generator.uniform(-1, 1, (len(observation), len(ACTIONS))).astype(np.float32)
 
 
 def schedule(settings: BipedSettings, factor: float = 1.0) -> PolicyFunction:
-    """Return the policy of a stiffness schedule times `factor`: `settings.schedule`, else the schedule that was tuned
-    with the leg constants.
+    """Return the policy that sets `factor` times the K of a schedule over the stride: of `settings.schedule`, else of
+    the schedule that was tuned with the leg constants.
 
-    The tuned schedule depends on the momentary commanded speed. Both schedules scale with the body.
+    The tuned schedule depends on the momentary commanded speed, linear between the tabulated speeds. Both schedules
+    scale with the body.
     """
     body = body_of(settings)
     speeds = tabulated_speeds(settings)
@@ -85,7 +88,7 @@ def schedule(settings: BipedSettings, factor: float = 1.0) -> PolicyFunction:
 
 def quasi_stiffness(settings: BipedSettings) -> PolicyFunction:
     """Return the policy whose K is people's ankle quasi-stiffness over the stride (`REFERENCE_STIFFNESS`), and
-    `TOE_STIFFNESS` at the toes; the same at every speed."""
+    `TOE_STIFFNESS` at the toes; the same at every speed, scaled with the body."""
     body = body_of(settings)
     ankle = plateau_curve(REFERENCE_STIFFNESS)
     stiffness = np.stack([ankle, np.full_like(ankle, TOE_STIFFNESS)], -1) * body.stiffness_scale
@@ -93,8 +96,7 @@ def quasi_stiffness(settings: BipedSettings) -> PolicyFunction:
 
 
 def follow(stiffness: NDArray, speeds: NDArray, settings: BipedSettings, body: Body) -> PolicyFunction:
-    """Return the policy that sets the ankle's and the toe's K as scheduled for each leg's phase and the commanded
-    speed.
+    """Return the policy that looks K of ankle and toe up in schedules, at each leg's phase and the commanded speed.
 
     Args:
         stiffness: schedules on `GRID` for each speed, (speeds, samples, (ankle, toe)) [N m/rad] for both legs, or
@@ -118,11 +120,11 @@ def follow(stiffness: NDArray, speeds: NDArray, settings: BipedSettings, body: B
         """Return the actions (N, 4) at phase and speed of the observations (N, D)."""
         # The commanded speed's position among the tabulated ones: 1.25 is a quarter of the way from row 1 to row 2.
         position = np.interp(observation[:, _SPEED], froude, np.arange(len(froude)))
-        place = np.zeros(len(position), PLACE)
-        place["row"] = position  # cut to a whole number
-        place["weight"] = position % 1.0  # of the next row
+        table_rows = np.zeros(len(position), PLACE)
+        table_rows["row"] = position  # cut to a whole number
+        table_rows["weight"] = position % 1.0  # of the next row
         # (N, leg of the phase, leg of the stiffness, joint): each leg takes its own stiffness at its own phase.
-        curves = table.at(leg_phase(observation), place).reshape(-1, len(SIDES), len(SIDES), joints)
+        curves = table.at(leg_phase(observation), table_rows).reshape(-1, len(SIDES), len(SIDES), joints)
         action = action_of(curves[:, legs, legs], settings, body)
         return action.reshape(len(observation), -1).astype(np.float32)
 
@@ -148,7 +150,10 @@ SWINGS = {"thesis": THESIS_SWING, "thesis_printed": PRINTED_SWING}
 
 
 def baseline(name: str, settings: BipedSettings, seed: int = 0) -> PolicyFunction:
-    """Return a baseline by name, in the environment of `settings`; `seed` is that of `random`."""
+    """Return the policy of a baseline for the environment of `settings`; `seed` is that of `random`.
+
+    `name` is one of `BASELINES`, or `constant:ANKLE,TOE` or `schedule:FACTOR`. Raises `SpringfootError` for any other.
+    """
     kind, colon, numbers = name.partition(":")
     if kind not in BASELINES:
         raise SpringfootError(f"no baseline {name!r}; there are {', '.join(BASELINES)}")
@@ -168,7 +173,7 @@ def baseline(name: str, settings: BipedSettings, seed: int = 0) -> PolicyFunctio
 
 
 def has_feedback(name: str) -> bool:
-    """Return True if the named policy may decide by more than the phase.
+    """Return True if the actions of the policy `name` may depend on more than phase and commanded speed.
 
     Baselines, open-loop copies and schedules in files have no feedback.
     """
@@ -181,7 +186,7 @@ def is_schedule_file(name: str) -> bool:
 
 
 def and_copy(name: str) -> tuple[str, ...]:
-    """Return the name of a policy and, if it has feedback, of its open-loop copy (see `FROZEN`)."""
+    """Return (name,) without feedback, else (name, name of its open-loop copy, see `FROZEN`)."""
     return (name, f"{FROZEN}:{name}") if has_feedback(name) else (name,)
 
 

@@ -139,7 +139,7 @@ def policy_from_sb3(
     layers, activation, output = actor_of(model.policy)
     mirror = getattr(model.policy, "mirror", None)  # of a MirroredNetwork
     statistics = statistics_of(normalizer)
-    if mirror is not None and not _alike(mirror, **statistics):
+    if mirror is not None and not _mirror_keeps_statistics(mirror, **statistics):
         raise SpringfootError("its network is mirrored, but its VecNormalize treats left and right differently")
     policy = policy_from_mlp(
         layers, settings, activation=activation, output=output, mirrored=mirror is not None, **statistics
@@ -153,7 +153,10 @@ def policy_from_sb3(
 
 
 def ignoring_unvaried(policy: Policy) -> Policy:
-    """Return the policy with the observation entries that never varied in training left out of its action."""
+    """Return the policy without the effect of observation entries that never varied in training.
+
+    Their variance becomes `IGNORED`, so that they are 0 once normalised.
+    """
     variance = np.where(policy.observation_variance < NEVER_VARIED, IGNORED, policy.observation_variance)
     return replace(policy, observation_variance=variance)
 
@@ -196,8 +199,13 @@ def actor_of(network: Any) -> tuple[Layers, str, Output]:
     return [(layer.weight, layer.bias) for layer in layers], names[activations.pop()], output
 
 
-def _alike(mirror: Mirror, observation_mean: Any = 0.0, observation_variance: Any = 1.0, **_: Any) -> bool:
-    """Return True if the statistics of observations, as of `statistics_of`, are those of the mirrored ones."""
+def _mirror_keeps_statistics(
+    mirror: Mirror, observation_mean: Any = 0.0, observation_variance: Any = 1.0, **_: Any
+) -> bool:
+    """Return True if mean and variance (D,) of observations are those of the mirrored observations, bit for bit.
+
+    Arguments beside `mirror` are those of `statistics_of`; others than the two are not read.
+    """
     mean, variance = (np.broadcast_to(value, len(mirror.index)) for value in (observation_mean, observation_variance))
     return np.array_equal(mirror.of(mean), mean) and np.array_equal(variance[mirror.index], variance)
 

@@ -56,7 +56,7 @@ def export_policy(policy: Policy, out: str | Path) -> list[Path]:
 
 
 def planned_files(out: str | Path) -> list[Path]:
-    """Return the files of an export, policy and contract.
+    """Return the paths of an export's two new files: the policy `out`, and its contract beside it.
 
     Raises `SpringfootError` if `out` does not end in `SUFFIX`, or one of them exists already.
     """
@@ -165,10 +165,10 @@ def contract_of(policy: Policy) -> dict[str, Any]:
 
 
 def _schedule(settings: BipedSettings) -> dict[str, Any]:
-    """Return the schedule that a residual action multiplies, as JSON values: K for each speed at each percent of the
-    leg's stride.
+    """Return the entry `schedule` of a contract: the K that a residual action multiplies, as JSON values.
 
-    K is that of the contract's body, 1.70 m and 63 kg.
+    `ankle` and `toe` are lists [speed][percent of the leg's stride] [N m/rad], for the contract's body, 1.70 m and
+    63 kg; `speed_m_s` holds the speeds.
     """
     walks = reference_walks(settings)
     scale = body_of(settings).stiffness_scale
@@ -219,7 +219,7 @@ def onnx_bytes(policy: Policy, scale: Scale, contract: str) -> bytes:
     layers = [(constant(w), constant(b)) for w, b in zip(policy.weights, policy.biases, strict=True)]
 
     def output_of(observation: str) -> str:
-        """Add the network on `observation`, up to its last layer."""
+        """Add to the graph the layers on `observation`, the name of an input; return the name of their output."""
         # Normalise the observation: (observation - mean) / deviation, clipped.
         x = node("Sub", node("Sub", observation, statistics[0]), statistics[1])
         x = node("Div", x, statistics[2])

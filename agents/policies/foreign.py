@@ -129,7 +129,7 @@ def onnx_policy(path: Path) -> ForeignPolicy:
             raise SpringfootError(reason)
         return session.run([output], {node.name: np.ascontiguousarray(observation, dtype)})[0]
 
-    return _accepted(str(path), act, biped)
+    return _policy_calling(str(path), act, biped)
 
 
 def is_function(name: str) -> bool:
@@ -162,7 +162,7 @@ def function_policy(name: str) -> ForeignPolicy:
         if not callable(function):
             file = getattr(module, "__file__", None) or "it"
             raise SpringfootError(f"{name}: module {module_name} has no function {function_name} ({file})")
-        return _accepted(name, function, Biped(settings or BipedSettings(), 1))
+        return _policy_calling(name, function, Biped(settings or BipedSettings(), 1))
 
 
 @contextmanager
@@ -204,7 +204,7 @@ def _environment_of(path: Path, inside: str | None) -> Biped:
 
 
 def _first_observations(biped: Biped) -> NDArray:
-    """Return the first observations (2, D) of two episodes, float32."""
+    """Return the first observation of each of two episodes, seeded 0 and 1, (2, D) float32; this resets `biped`."""
     observations = []
     for seed in range(2):
         biped.reset(np.array([0]), [seed])
@@ -212,10 +212,12 @@ def _first_observations(biped: Biped) -> NDArray:
     return np.stack(observations)
 
 
-def _accepted(name: str, act: Callable[[NDArray], Any], biped: Biped) -> ForeignPolicy:
-    """Return the policy of a function `act` that takes (N, D), (1, D) or (D,): the first form that works.
+def _policy_calling(name: str, act: Callable[[NDArray], Any], biped: Biped) -> ForeignPolicy:
+    """Return the policy `name` of a function `act` of observations (N, D), (1, D) or (D,), called in the first of these
+    forms that works.
 
-    Tries each form on first observations of two episodes. Raises `SpringfootError` if none returns finite actions.
+    Tries each form on the first observations of two episodes of `biped`. Raises `SpringfootError` if none returns
+    actions of the right shape, and for actions that are not finite.
     """
     observations = _first_observations(biped)
     actions = len(biped.action_names)

@@ -25,7 +25,7 @@ _CHILD = "from springfoot.agents.policies.onnx_process import main; main()"
 
 
 def form(observation: NDArray) -> str:
-    """Return the one of `FORMS` that an observation has."""
+    """Return the entry of `FORMS` that describes the shape of `observation`."""
     several_rows, one_row, without_rows = FORMS
     if observation.ndim == 1:
         return without_rows
@@ -53,7 +53,7 @@ def onnx_session(path: Path, observations: NDArray) -> tuple[Any, dict[str, str]
 
 
 def _session(path: Path) -> Any:
-    """Open a file with onnxruntime, on one thread."""
+    """Return onnxruntime's session of the file `path`, on one thread."""
     import onnxruntime  # not above: an extra
 
     options = onnxruntime.SessionOptions()
@@ -79,7 +79,7 @@ def main() -> None:
     except Exception as error:  # onnxruntime's errors have no common class
         result["refused"] = one_line(error)
     else:
-        result["fails"] = _fails(session, np.array(json.loads(sys.argv[2])))
+        result["fails"] = _failures(session, np.array(json.loads(sys.argv[2])))
     os.write(stdout, json.dumps(result).encode())
 
 
@@ -95,9 +95,12 @@ def _operators(model: Any) -> set[str]:
     return names
 
 
-def _fails(session: Any, observations: NDArray) -> dict[str, str]:
-    """Run a session on observations (N, D): on all, on each row as (1, D), and on each as (D,); return the reason of a
-    failure for each `form` that fails."""
+def _failures(session: Any, observations: NDArray) -> dict[str, str]:
+    """Return form -> error text of the `FORMS` in which a session fails on the observations (N, D).
+
+    It runs on all rows together, on each row as (1, D), and on each as (D,). Empty for a session that has another
+    number of inputs than one, or an input of another type.
+    """
     inputs = session.get_inputs()
     failed: dict[str, str] = {}
     if len(inputs) != 1 or inputs[0].type not in INPUT_TYPES:

@@ -101,17 +101,17 @@ class Policy:
 
     @property
     def layer_sizes(self) -> list[int]:
-        """Return the widths of observation, hidden layers and output."""
+        """Return the widths of observation, hidden layers and output, which with a `mirror` is one leg's actions."""
         return [self.weights[0].shape[1], *(len(bias) for bias in self.biases)]
 
     @property
     def action_count(self) -> int:
-        """Return how many actions it gives."""
+        """Return the number of actions for one observation, both legs' together."""
         return len(self.biases[-1]) if self.mirror is None else len(self.mirror.action_index)
 
     @property
     def header(self) -> dict[str, Any]:
-        """Return the file's header, as plain JSON values."""
+        """Return the header of the policy's file, as plain JSON values: all but the numbers of its tensors."""
         return {
             "format_version": FORMAT_VERSION,
             "network": {
@@ -128,7 +128,7 @@ class Policy:
 
     @property
     def observation_deviation(self) -> np.ndarray:
-        """Return (D,) the standard deviation that normalises observations, with the variance floor."""
+        """Return (D,) the divisor that normalises observations: the root of variance and variance floor together."""
         return np.sqrt(self.observation_variance + self.variance_floor)
 
     def __call__(self, observation: np.ndarray) -> np.ndarray:
@@ -139,7 +139,10 @@ class Policy:
         return self.mirror.both_legs(self._output_of(rows), self._output_of(self.mirror.of(rows)))
 
     def _output_of(self, rows: np.ndarray) -> np.ndarray:
-        """Return the network's output in [-1, 1], float32, for observations (..., D), float64 and finite."""
+        """Return the network's output in [-1, 1], float32, for raw observations (..., D), float64 and finite.
+
+        Raises `SpringfootError` if the output is not finite.
+        """
         rows = (rows - self.observation_mean) / self.observation_deviation
         if self.observation_clip is not None:
             rows = rows.clip(-self.observation_clip, self.observation_clip)
@@ -187,8 +190,8 @@ def find_policy(name: str | Path) -> Path:
 
 
 def perhaps_policy(name: str, known: Iterable[str]) -> str:
-    """Return the end of a message on a policy `name` that is not there: the most similar of the `known` names, or of
-    the folders and policy files beside that path; "" if none is similar."""
+    """Return the hint that ends a message on a missing policy `name`: the most similar of the `known` names, else of
+    the folders and policy files in the folder of that path; "" if none is similar."""
     path = Path(name)
     beside: list[str] = []
     with suppress(OSError):
@@ -239,8 +242,8 @@ def read_policy(name: str | Path) -> Policy:
     except (KeyError, TypeError, ValueError, OverflowError) as error:  # the last: an integer too large for a float
         fault = f"has no {error}" if isinstance(error, KeyError) else f"is not valid: {error}"
         raise SpringfootError(f"{name}: its header {fault}") from None
-    known = activation in ACTIVATIONS and output in get_args(Output) and isinstance(mirrored, bool)
-    if not known or floor is None or not 0 <= floor <= LARGEST_WEIGHT:
+    has_functions = activation in ACTIVATIONS and output in get_args(Output) and isinstance(mirrored, bool)
+    if not has_functions or floor is None or not 0 <= floor <= LARGEST_WEIGHT:
         raise SpringfootError(f"{name}: its header asks for a network this version does not have: {quoted(network)}")
     if clip is not None and not 0 < clip <= LARGEST_WEIGHT:
         raise SpringfootError(f"{name}: observation_clip must be in (0, {LARGEST_WEIGHT:g}] or null, is {clip:g}")

@@ -46,12 +46,12 @@ def schedule_file(
     """
     path = Path(name)
     if path.suffix.lower() == ".json":
-        springs = _states(path, settings_of_body)
+        springs = _schedule_of_states(path, settings_of_body)
         needed = {"action_mode": "absolute", "equilibrium": "phase", "schedule": springs.to_json()}
         return needed, schedule  # the baseline, which plays the schedule of the settings
     table = read_csv(path)
-    stiffness = _stiffness(table) * _scale(_cell(table, "height_m"), _cell(table, "mass_kg"), settings_of_body)
-    needed = {"action_mode": "absolute"} | _equilibrium(table, stiffness)
+    stiffness = _stiffness_curves(table) * _scale(_cell(table, "height_m"), _cell(table, "mass_kg"), settings_of_body)
+    needed = {"action_mode": "absolute"} | _rest_angle_settings(table, stiffness)
     # One schedule serves all speeds: [None] is the axis of speeds, and its single entry may be any.
     return needed, lambda settings: follow(stiffness[None], np.zeros(1), settings, body_of(settings))
 
@@ -123,9 +123,11 @@ def _curves(table: Table, quantity: str) -> NDArray:
     return on_grid.transpose(2, 0, 1)
 
 
-def _stiffness(table: Table) -> NDArray:
-    """Return K (SAMPLES, side, joint) [N m/rad] of a table; raise `SpringfootError` for numbers outside the accepted
-    range."""
+def _stiffness_curves(table: Table) -> NDArray:
+    """Return K on `GRID`, (SAMPLES, side, joint) [N m/rad], of a table, not scaled; joints are ankle and toe.
+
+    Raises `SpringfootError` for numbers outside `STIFFNESS_RANGE`, and as `_curves`.
+    """
     stiffness = _curves(table, "stiffness_Nm_per_rad")
     low, high = STIFFNESS_RANGE
     if not (low < stiffness.min() and stiffness.max() <= high):
@@ -136,7 +138,7 @@ def _stiffness(table: Table) -> NDArray:
     return stiffness
 
 
-def _equilibrium(table: Table, stiffness: NDArray) -> dict[str, Any]:
+def _rest_angle_settings(table: Table, stiffness: NDArray) -> dict[str, Any]:
     """Return the environment settings of a table's rest angles: `equilibrium`, and `schedule` if it is `phase`.
 
     `equilibrium` is the word in the column of that name, `planned` without the column. `schedule`, in JSON form, has
@@ -165,7 +167,7 @@ def _equilibrium(table: Table, stiffness: NDArray) -> dict[str, Any]:
 # Springs of finite states, in a JSON file --------------------------------------------------------------------
 
 
-def _states(path: Path, settings: BipedSettings) -> StiffnessSchedule:
+def _schedule_of_states(path: Path, settings: BipedSettings) -> StiffnessSchedule:
     """Return the schedule in a file of finite states: K and rest angle of ankle and toe, constant in each state.
 
     K is scaled to the body of `settings`. Raises `SpringfootError` as `read_states` does, and for a damping time other

@@ -46,9 +46,9 @@ class Header(TypedDict):
 
 
 def checkpoints(out: Path) -> list[Path]:
-    """Return the checkpoints in a folder, the one of the most timesteps first."""
-    named = [path for path in out.iterdir() if _NAME.fullmatch(path.name)]
-    return sorted(named, key=_timesteps, reverse=True)
+    """Return the paths of the checkpoints in the folder `out`, the one of the most timesteps first."""
+    paths = [path for path in out.iterdir() if _NAME.fullmatch(path.name)]
+    return sorted(paths, key=_timesteps, reverse=True)
 
 
 def write_checkpoint(
@@ -65,7 +65,10 @@ def write_checkpoint(
 
 
 def read_checkpoint(path: Path) -> Checkpoint:
-    """Return header and arrays of a checkpoint; raise `SpringfootError` for a damaged file, and for any other file."""
+    """Return header and arrays of the checkpoint in the file `path`.
+
+    Raises `SpringfootError` for a damaged file, and for any other file.
+    """
     names = Header.__annotations__
     header, arrays = read_tensors(path, STATE_KEY, "training state", set(names), finite=False, needs_digest=True)
     if missing := [name for name in names if name not in header]:
@@ -96,7 +99,7 @@ def _require_header(header: dict[str, Any]) -> None:
 
 
 def newest_checkpoint(out: Path) -> Checkpoint | None:
-    """Return header and arrays of the newest whole checkpoint, None if there are no checkpoints.
+    """Return header and arrays of the newest whole checkpoint in the folder `out`; None if it has no checkpoints.
 
     Damaged ones are renamed to end in `.damaged`, with a warning on standard error. Raises `SpringfootError`, with
     nothing changed, if all are damaged.
@@ -119,7 +122,7 @@ def newest_checkpoint(out: Path) -> Checkpoint | None:
 
 
 def _timesteps(path: Path) -> int:
-    """Return the timesteps in a checkpoint's file name."""
+    """Return the timesteps N in the file name `state-N.safetensors` of a checkpoint."""
     match = _NAME.fullmatch(path.name)
     assert match is not None
     return int(match[1])

@@ -227,7 +227,10 @@ def _is_count(value: Any) -> bool:
 
 
 def config_from_json(values: dict[str, Any]) -> TrainingConfig:
-    """Return the configuration of a dictionary as from `config_to_json`; raise `SpringfootError` for a bad one."""
+    """Return the configuration in a dictionary as from `config_to_json`; settings that it leaves out have defaults.
+
+    Raises `SpringfootError` for an unknown name or a bad value.
+    """
     names = [item.name for item in dataclasses.fields(TrainingConfig)]
     if unknown := sorted(set(values) - set(names)):
         raise SpringfootError(f"unknown training setting {unknown[0]!r}; valid: {', '.join(names)}")

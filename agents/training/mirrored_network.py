@@ -37,7 +37,7 @@ class MirroredNetwork(ActorCriticPolicy):
         super()._build(lr_schedule)
 
     def _build_mlp_extractor(self) -> None:
-        """Create the hidden layers."""
+        """Create the hidden layers of actor and critic, which see an observation and its mirror image."""
         self.mlp_extractor = _BothImages(
             self.features_dim,
             net_arch=self.net_arch,
@@ -47,7 +47,10 @@ class MirroredNetwork(ActorCriticPolicy):
         )
 
     def _get_action_dist_from_latent(self, latent_pi: torch.Tensor) -> Distribution:
-        """Return the distribution of the actions (N, A) from the last hidden layer (N, 2, H) for both images."""
+        """Return the distribution of N rows of A actions, those of both legs in the environment's order.
+
+        `latent_pi` (N, 2, H) is the actor's last hidden layer, of H units, for the observation and for its image.
+        """
         mean = self.action_net(latent_pi).flatten(-2)[..., self._legs_order]
         assert isinstance(self.action_dist, DiagGaussianDistribution)
         return self.action_dist.proba_distribution(mean, self.log_std.repeat(2)[self._legs_order])
@@ -62,15 +65,15 @@ class _BothImages(MlpExtractor):
         self._sign = torch.from_numpy(mirror.sign.astype(np.float32))
 
     def forward_actor(self, features: torch.Tensor) -> torch.Tensor:
-        """Return the actor's last hidden layer (N, 2, H) for observations (N, D) and their images."""
-        return self.policy_net(self._both(features))
+        """Return the actor's last hidden layer, of H units, for observations (N, D) and their images: (N, 2, H)."""
+        return self.policy_net(self._with_images(features))
 
     def forward_critic(self, features: torch.Tensor) -> torch.Tensor:
-        """Return the critic's last hidden layer (N, H), the sum over both images of observations (N, D)."""
-        return self.value_net(self._both(features)).sum(-2)
+        """Return the critic's last hidden layer (N, H), of H units: the sum for observations (N, D) and images."""
+        return self.value_net(self._with_images(features)).sum(-2)
 
-    def _both(self, features: torch.Tensor) -> torch.Tensor:
-        """Return observations and their images, (N, 2, D)."""
+    def _with_images(self, features: torch.Tensor) -> torch.Tensor:
+        """Return normalised observations (N, D) with their mirror images, (N, 2, D): the image has index 1."""
         return torch.stack((features, features[..., self._index] * self._sign), -2)
 
 
@@ -82,7 +85,7 @@ class MirroredMeanStd(RunningMeanStd):
         self._mirror = mirror
 
     def update(self, arr: NDArray) -> None:
-        """Count the observations (N, D) in, and their images."""
+        """Add the observations `arr` (N, D) and their mirror images to the running mean and variance."""
         mean = np.mean(arr, axis=0)
         variance = np.var(arr, axis=0)
         image = self._mirror.of(mean)

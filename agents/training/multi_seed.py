@@ -99,11 +99,11 @@ def _train_on_ray(
     except KeyboardInterrupt:
         stopping = signal.SIGINT
     if_incomplete = "interrupted" if stopping else "failed"
-    return [_row(config, folder, if_incomplete) for config, folder, _ in jobs], stopping
+    return [_result_row(config, folder, if_incomplete) for config, folder, _ in jobs], stopping
 
 
 def _command(config: TrainingConfig, folder: Path) -> list[str]:
-    """Return the command that trains or continues one seed in a process of its own, on one thread."""
+    """Return the words of the command line that trains or continues one seed in `folder`, on one thread."""
     values = config_to_json(replace(config, threads=1))
     return [sys.executable, "-m", __name__, str(folder), json.dumps(values)]
 
@@ -172,10 +172,12 @@ class _Trainings:
     def run(self, config: TrainingConfig, folder: Path, name: str) -> dict[str, Any]:
         """Train in a process of its own, print its messages after its `name`, and return its row of results."""
         command = _command(config, folder)
-        _block(True)  # the new process inherits this, and unblocks after its imports; this thread only waits for it
+        _block_signals(
+            True
+        )  # the new process inherits this, and unblocks after its imports; this thread only waits for it
         with self._lock:
             if self.stopping:
-                return _row(config, folder, "not begun")
+                return _result_row(config, folder, "not begun")
             # In a session of its own it does not get the terminal's Ctrl-C; this process passes it on, once.
             process = subprocess.Popen(
                 command,
@@ -198,10 +200,10 @@ class _Trainings:
             if (folder / RUN).is_file():
                 saved = f"springfoot train --resume {folder} goes on from what it has saved"
             print(f"{name}: its process was ended by {ended}; {saved}", file=sys.stderr, flush=True)
-        return _row(config, folder, "interrupted" if self.stopping else "failed")
+        return _result_row(config, folder, "interrupted" if self.stopping else "failed")
 
     def _stop(self, number: int, _frame: Any) -> None:
-        """Pass a signal on to the running trainings."""
+        """Handle a signal: note it as the reason to stop, and pass it on to the running trainings."""
         with self._lock:
             self.stopping = signal.Signals(number)
             for process in self._running:
@@ -224,17 +226,17 @@ class _Trainings:
             process.terminate()
 
 
-def _block(blocked: bool) -> None:
+def _block_signals(blocked: bool) -> None:
     """Block or unblock SIGINT and SIGTERM in this thread and in the processes it starts."""
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(signal.SIG_BLOCK if blocked else signal.SIG_UNBLOCK, SIGNALS)
 
 
-def _row(config: TrainingConfig, folder: Path, if_incomplete: str) -> dict[str, Any]:
+def _result_row(config: TrainingConfig, folder: Path, if_incomplete: str) -> dict[str, Any]:
     """Return one seed's row of results, a seed of `seeds.json`, from the run.json in `folder`.
 
-    Its status is `if_incomplete` if that file is missing or still says `running`: the training ended without a word.
-    Numbers that are not known are None.
+    Its status is `if_incomplete` if that file is missing or still says `running`: the training was cut off. Numbers
+    that the file lacks are None.
     """
     record = read_record(folder) if (folder / RUN).is_file() else {}
     status = record.get("status", "running")
@@ -253,7 +255,10 @@ def _row(config: TrainingConfig, folder: Path, if_incomplete: str) -> dict[str, 
 
 
 def _main() -> int:
-    """Train one seed in this process; its arguments are a folder and a configuration as JSON text."""
+    """Train one seed in this process, as `_command` asks; return the exit code.
+
+    The words of the command line are a folder and a configuration as JSON text.
+    """
     folder, config = sys.argv[1:]
     return exit_code("train.py", lambda: _train(config_from_json(json.loads(config)), folder))
 
@@ -265,7 +270,7 @@ def _train(config: TrainingConfig, folder: str) -> int:
     from .training import resume, train  # not above: torch takes seconds, and the parent process does not need it
 
     tell_of_compiling()
-    _block(False)  # a signal that came during the imports is delivered here, where `exit_code` catches it
+    _block_signals(False)  # a signal that came during the imports is delivered here, where `exit_code` catches it
     end_in_order()
     record = resume(folder, threads=config.threads) if (Path(folder) / RUN).is_file() else train(config, folder)
     return stopped_by(record) if record["status"] == "interrupted" else 0

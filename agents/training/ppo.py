@@ -72,9 +72,12 @@ class Learner:
             )
 
     def policy(self, fingerprint: dict[str, str]) -> Policy:
-        """Return a copy of the actor as a policy that acts by its mean action."""
+        """Return a copy of the actor as a policy that acts by its mean action, with the environment's `fingerprint`.
+
+        Entries of the observation that never varied in training are left out of the action.
+        """
         layers, _, _ = actor_of(self.ppo.policy)
-        seen = self._statistics()["observation"]
+        of_observations = self._statistics()["observation"]
         # The weights of observations that never varied (body, commanded speed) are still their random initial ones.
         return ignoring_unvaried(
             Policy(
@@ -82,8 +85,8 @@ class Learner:
                 fingerprint=fingerprint,
                 weights=tuple(weight.detach().numpy().copy() for weight, _ in layers),
                 biases=tuple(bias.detach().numpy().copy() for _, bias in layers),
-                observation_mean=seen.mean.copy(),
-                observation_variance=seen.var,
+                observation_mean=of_observations.mean.copy(),
+                observation_variance=of_observations.var,
                 observation_clip=self.normalized.clip_obs,
                 mirror=self._mirror,
             )
@@ -130,7 +133,7 @@ class Learner:
             raise SpringfootError(f"{subject} does not fit its configuration: {reason}") from None
 
     def _statistics(self) -> dict[str, RunningMeanStd]:
-        """Return the running statistics of `observation` and `return`, not copied."""
+        """Return the running mean and variance by name, `observation` and `return`: the learner's, not copies."""
         observation: Any = self.normalized.obs_rms  # a dictionary only for dictionary observations
         return {"observation": observation, "return": self.normalized.ret_rms}
 

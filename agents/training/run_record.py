@@ -20,7 +20,7 @@ RLLIB = "rllib"
 
 
 def read_record(out: Path) -> dict[str, Any]:
-    """Return the record in a run's folder; raise `SpringfootError` if there is none or it is malformed."""
+    """Return the content of run.json in a run's folder; raise `SpringfootError` if it is missing or malformed."""
     record = read_object(out / RUN, "record of a run")
     try:
         if not isinstance(record["config"], dict):
@@ -58,7 +58,7 @@ def runs_within(out: Path) -> list[Path]:
 
 
 def write_record(out: Path, record: Mapping[str, Any]) -> None:
-    """Write the record, whole or not at all."""
+    """Write `record` as run.json into the folder `out`, with a digest, whole or not at all."""
     write_atomically(out / RUN, object_with_digest(dict(record)))
 
 
@@ -69,14 +69,16 @@ def is_of_rllib(record: Mapping[str, Any]) -> bool:
 
 
 def best_of(record: Mapping[str, Any]) -> dict[str, Any] | None:
-    """Return the evaluation with the highest mean return, the first of equal ones; None without evaluations."""
+    """Return the entry with the highest mean return of `evaluations_of_one_task`, the first of equal ones; None without
+    evaluations."""
     return max(evaluations_of_one_task(record), key=lambda entry: entry["return_mean"], default=None)
 
 
 def evaluations_of_one_task(record: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return the evaluations whose returns can be compared, in their order.
+    """Return the entries of `evaluations` whose returns can be compared, in their order.
 
-    If a session changed the task and measured the best policy anew, they are that measurement and later evaluations.
+    After a session that changed the task and measured the best policy anew, they are that measurement and the later
+    evaluations; earlier ones are left out.
     """
     entries: list[dict[str, Any]] = record["evaluations"]
     for session in reversed(record["sessions"]):
@@ -86,12 +88,12 @@ def evaluations_of_one_task(record: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def same_source(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
-    """Return True if two sessions ran the same code, with the same versions."""
+    """Return True if two sessions of run.json ran the same code (commit, `modified`) with the same `versions`."""
     return all(one.get(name) == other.get(name) for name in ("commit", "modified", "versions"))
 
 
 def event_sizes(out: Path) -> dict[str, int]:
-    """Return name -> size of each event file [bytes]."""
+    """Return name -> size [bytes] of each of TensorBoard's event files in the folder `out`."""
     return {path.name: path.stat().st_size for path in sorted(out.glob(EVENTS))}
 
 

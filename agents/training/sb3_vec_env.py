@@ -33,8 +33,9 @@ class SegmentedFootBipedVecEnv(VecEnv):
         self._lengths = np.zeros(num_envs, int)
 
     def reset(self) -> np.ndarray:
-        """Return the first observations (N, D) of new episodes, from the seeds given to `seed` since the last reset."""
-        options = _merged(self._options)
+        """Begin a new episode in every environment, with the seeds and options set since the last reset; return the
+        first observations (N, D)."""
+        options = _merge_options(self._options)
         observation, _ = self.env.reset(seed=self._seeds, options=options or None)
         self._reset_seeds()
         self._reset_options()
@@ -53,9 +54,11 @@ class SegmentedFootBipedVecEnv(VecEnv):
         self._returns += reward
         self._lengths += 1
         infos: list[dict[str, Any]] = [{} for _ in range(self.num_envs)]
-        self.step_info = _values(info)
+        self.step_info = _step_values(info)
         if done.any():
-            final = _values(info["final_info"])  # of the last step; `info` already is that of the new episode's reset
+            final = _step_values(
+                info["final_info"]
+            )  # of the last step; `info` already is that of the new episode's reset
             self.step_info = {name: np.where(done, last, info.get(name, last)) for name, last in final.items()}
             for i in np.flatnonzero(done):
                 infos[i] = {name: values[i] for name, values in final.items()} | {
@@ -74,7 +77,8 @@ class SegmentedFootBipedVecEnv(VecEnv):
         return self.env.biped.state() | episodes
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Continue from a `state`; raise `SpringfootError` for a state of other settings."""
+        """Continue from `state`, as the method of that name returned it; raise `SpringfootError` for a state of other
+        settings."""
         for name, present in (("episode.return", self._returns), ("episode.length", self._lengths)):
             if np.shape(state.get(name, ())) != present.shape:
                 raise SpringfootError(f"the state does not fit: {name!r} must be {present.shape}")
@@ -88,7 +92,7 @@ class SegmentedFootBipedVecEnv(VecEnv):
         self.env.close()
 
     def get_images(self) -> Sequence[np.ndarray | None]:
-        """Return one picture of each environment."""
+        """Return one picture of each environment, None for each if the environment does not render."""
         return list(self.env.render() or [None] * self.num_envs)
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
@@ -118,11 +122,11 @@ class SegmentedFootBipedVecEnv(VecEnv):
             raise SpringfootError(f"cannot {action} for some environments only: the batch is one simulation")
 
 
-def _merged(by_environment: Sequence[dict[str, Any]]) -> dict[str, Any]:
+def _merge_options(by_environment: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """Return the reset options of the batch, merged from those of each environment, `by_environment`.
 
     The options of `GIVEN` (bodies, speeds, feet) may differ between environments and become lists; all others must
-    agree. Raises `SpringfootError` otherwise, and for one of `GIVEN` that is given to some environments only.
+    agree. Raises `SpringfootError` otherwise, and for an option of `GIVEN` that only some environments have.
     """
     merged, *others = (
         {name: value for name, value in options.items() if name not in GIVEN} for options in by_environment
@@ -138,9 +142,9 @@ def _merged(by_environment: Sequence[dict[str, Any]]) -> dict[str, Any]:
     return merged
 
 
-def _values(info: dict[str, Any]) -> dict[str, np.ndarray]:
-    """Return name -> values (N,) of a vector environment's info.
+def _step_values(info: dict[str, Any]) -> dict[str, np.ndarray]:
+    """Return name -> values (N,) of a vector environment's `info`.
 
-    Leaves out its masks (`_NAME`), and the last observations and infos of ended episodes (`final_NAME`).
+    Leaves out the masks (`_NAME`), and the last observations and infos of ended episodes (`final_NAME`).
     """
     return {name: values for name, values in info.items() if not name.startswith(("_", "final_"))}

@@ -132,7 +132,7 @@ class Session(BaseCallback):
                     callbacks = SessionAndUserCallbacks(self, self._user_callbacks, self._stopping.ask)
                     steps = self._config.timesteps - self._first_timesteps
                     ppo.learn(steps, callbacks, reset_num_timesteps=False)
-                self._save("finished" if self._finished else "interrupted")
+                self._save("finished" if self._is_finished else "interrupted")
         except OSError as error:
             written = checkpoints(self._out) if self._out.is_dir() else []
             saved = f"resume goes on from {written[0].name}" if written else "nothing of it was saved"
@@ -186,8 +186,8 @@ class Session(BaseCallback):
         return header["learning"]["logged"]
 
     @property
-    def _finished(self) -> bool:
-        """Return True if all timesteps are done and evaluated."""
+    def _is_finished(self) -> bool:
+        """Return True if the configured timesteps are done, and the last evaluation is of the policy after them."""
         evaluations = self._record["evaluations"]
         return bool(evaluations) and evaluations[-1]["timesteps"] == self._trained >= self._config.timesteps
 
@@ -230,7 +230,7 @@ class Session(BaseCallback):
         if not self._rollout_complete:
             return  # ended within a rollout: the state captured at its start is the last one between two updates
         self._capture()
-        if not self._stopping.asked and not self._finished:
+        if not self._stopping.asked and not self._is_finished:
             self._evaluate()
 
     def _capture(self) -> None:

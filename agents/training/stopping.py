@@ -34,7 +34,7 @@ class Stopping:
         self.asked = True
 
     def _restore(self) -> None:
-        """Restore the signal handlers from before."""
+        """Restore the signal handlers that stood before the block."""
         for number, handler in self._handlers_before.items():
             signal.signal(number, handler)
 

@@ -41,14 +41,17 @@ def train(
     empty folder, if another process writes into it, or if that network does not fit.
     """
     out = require_new(out)
-    begin = None if begin_from is None else _trained(Path(begin_from))
+    begin = None if begin_from is None else _checkpoint_to_begin_from(Path(begin_from))
     with owned(out):
         remove_temporary(require_new(out))  # checked again, now that no other process can write into it
         return Session(config, out, {"sessions": [], "evaluations": []}, callbacks=callbacks, begin=begin).learn()
 
 
-def _trained(run: Path) -> Checkpoint:
-    """Return the newest checkpoint of the folder `run`; raise `SpringfootError` if there is none."""
+def _checkpoint_to_begin_from(run: Path) -> Checkpoint:
+    """Return the newest checkpoint of the run in the folder `run`, with which another training begins.
+
+    Raises `SpringfootError` if there is none.
+    """
     checkpoint = newest_checkpoint(run) if run.is_dir() else None
     if checkpoint is None:
         raise SpringfootError(f"{run} holds no checkpoint to begin from: give the folder of a run")

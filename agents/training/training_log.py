@@ -21,7 +21,7 @@ def log_configuration(logger: Logger, config: TrainingConfig) -> None:
     it."""
     values = config_to_json(config)
     text = "```json\n" + json.dumps(values, indent=2) + "\n```"
-    hyperparameters = HParam(_flat(values), dict.fromkeys(METRICS, 0.0))
+    hyperparameters = HParam(_flatten(values), dict.fromkeys(METRICS, 0.0))
     for output in logger.output_formats:
         if isinstance(output, TensorBoardOutputFormat):
             both: dict[str, Any] = {"configuration": text, "hyperparameters": hyperparameters}
@@ -45,7 +45,7 @@ def without_writer_tracebacks() -> Iterator[None]:
         threading.excepthook = before
 
 
-def _flat(values: dict[str, Any], prefix: str = "") -> dict[str, bool | str | float | None]:
+def _flatten(values: dict[str, Any], prefix: str = "") -> dict[str, bool | str | float | None]:
     """Return nested dictionaries as one: `{"environment": {"speed": 1.2}}` as `{"environment/speed": 1.2}`.
 
     Lists become JSON text; entries of None are left out.
@@ -53,7 +53,7 @@ def _flat(values: dict[str, Any], prefix: str = "") -> dict[str, bool | str | fl
     flat: dict[str, bool | str | float | None] = {}
     for name, value in values.items():
         if isinstance(value, dict) and value:
-            flat |= _flat(value, f"{prefix}{name}/")
+            flat |= _flatten(value, f"{prefix}{name}/")
         elif value is not None:
             flat[f"{prefix}{name}"] = value if isinstance(value, (bool, int, float, str)) else json.dumps(value)
     return flat

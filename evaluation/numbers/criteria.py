@@ -146,7 +146,7 @@ def _rmse(joint: str, high: float) -> Criterion:
     )
 
 
-def _r(name: str, path: tuple[str, ...], low: float) -> Criterion:
+def _correlation(name: str, path: tuple[str, ...], low: float) -> Criterion:
     """Return the criterion of a correlation with people's curve, at least `low`."""
     return Criterion(name=name, path=path, low=low, pattern=".3f", loosen="r", label=_FORCES.get(name, ""))
 
@@ -178,7 +178,7 @@ WALKS = (
     _rmse("ankle", 4.0),
     _force("vertical_peak1_bw", high=1.3),
     _force("vertical_peak2_bw", high=1.3),
-    _r("vertical_r", ("grf", "vertical_r"), 0.93),
+    _correlation("vertical_r", ("grf", "vertical_r"), 0.93),
 )
 """Criteria of a walk: angles nearer to people's mean than one person's usually are, no hard landing."""
 
@@ -186,7 +186,7 @@ MOVES_LIKE_PEOPLE = (
     _rmse("thigh", 2.5),
     _rmse("knee", 3.5),
     _rmse("ankle", 2.5),
-    *(_r(f"{joint} r", ("joints", joint, "r"), 0.98) for joint in ("thigh", "knee", "ankle")),
+    *(_correlation(f"{joint} r", ("joints", joint, "r"), 0.98) for joint in ("thigh", "knee", "ankle")),
     *(
         Criterion(
             name=f"{joint} within SD", path=("joints", joint, "within_1sd_percent"), low=low, unit=" %", pattern=".0f"
@@ -205,10 +205,10 @@ LOADS_LIKE_PEOPLE = (
     _force("vertical_valley_bw", 0.75, 0.88),
     _force("vertical_peak2_bw", 1.05, 1.22),
     _force("vertical_max_bw", high=1.3),
-    _r("vertical_r", ("grf", "vertical_r"), 0.97),
+    _correlation("vertical_r", ("grf", "vertical_r"), 0.97),
     _force("braking_peak_bw", -0.20, -0.12),
     _force("forward_peak_bw", 0.16, 0.25),
-    _r("forward_r", ("grf", "forward_r"), 0.95),
+    _correlation("forward_r", ("grf", "forward_r"), 0.95),
     Criterion(
         name="ankle moment peak",
         path=("moments", "ankle", "peak_Nm_kg"),
@@ -225,9 +225,9 @@ LOADS_LIKE_PEOPLE = (
         unit=" %",
         pattern=".0f",
     ),
-    _r("ankle moment r", ("moments", "ankle", "r"), 0.95),
-    _r("knee moment r", ("moments", "knee", "r"), 0.8),
-    _r("hip moment r", ("moments", "hip", "r"), 0.9),
+    _correlation("ankle moment r", ("moments", "ankle", "r"), 0.95),
+    _correlation("knee moment r", ("moments", "knee", "r"), 0.8),
+    _correlation("hip moment r", ("moments", "hip", "r"), 0.9),
     Criterion(
         name="hip moment within 2 SD",
         path=("moments", "hip", "within_2sd_percent"),
@@ -253,17 +253,17 @@ def _work(joint: str, sign: str, low: float, high: float) -> Criterion:
     return Criterion(name=name, path=path, low=low, high=high, unit=" J/kg", pattern=".3f", loosen="share")
 
 
-def _near_people(joint: str, sign: str, peoples_work: float) -> Criterion:
+def _work_near_people(joint: str, sign: str, peoples_work: float) -> Criterion:
     """Return the criterion of work within 30 % or, if larger, 0.05 J/kg of people's work in a stride [J/kg]."""
     band = max(0.3 * peoples_work, 0.05)
     return _work(joint, sign, round(max(peoples_work - band, 0.0), 3), round(peoples_work + band, 3))
 
 
 WORKS_LIKE_PEOPLE = (
-    _near_people("hip", "positive", 0.18),
-    _near_people("hip", "negative", 0.13),
-    _near_people("knee", "positive", 0.04),
-    _near_people("knee", "negative", 0.24),
+    _work_near_people("hip", "positive", 0.18),
+    _work_near_people("hip", "negative", 0.13),
+    _work_near_people("knee", "positive", 0.04),
+    _work_near_people("knee", "negative", 0.24),
     _work("ankle", "positive", 0.25, 0.45),
     _work("ankle", "negative", 0.08, 0.20),
     Criterion(name="cost of transport", path=("cost_of_transport",), high=0.115, pattern=".3f", loosen="share"),

@@ -22,7 +22,7 @@ class StrideCurves:
     """(101, C) sum of squares over the strides."""
 
     def add(self, curves: NDArray) -> None:
-        """Add the curves (S, 101, C) of S strides."""
+        """Add the C curves of S strides, (S, 101, C) over percent of the stride, to the sums."""
         self.count += len(curves)
         self.total = self.total + curves.sum(axis=0)
         self.squares = self.squares + np.square(curves).sum(axis=0)
@@ -43,7 +43,7 @@ class StrideCurves:
         return self._pick(np.sqrt(np.maximum(variance, 0.0)), name)
 
     def _pick(self, values: NDArray, name: str) -> NDArray:
-        """Return the column (101,) of the curve `name` of `values` (101, C)."""
+        """Return that column (101,) of `values` (101, C) which belongs to the curve `name`."""
         return values[:, self.names.index(name)]
 
     def _missing(self) -> NDArray:

@@ -1,4 +1,4 @@
-"""Measure the cost of a recorded walk to its muscles, by the price of `springfoot.gait.plan.effort`."""
+"""Measure the effort of a recorded walk, the cost to its muscles as `springfoot.gait.plan.effort` defines it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -41,7 +41,7 @@ class EpisodeEffort:
     use: MuscleUse
     """Activation, rate and energy of the muscles' fibres."""
     net_energy: NDArray
-    """(side, joint) energy by the same price, but of the work of net joint moments [J]."""
+    """(side, joint) metabolic energy, of the work of net joint moments in place of the fibres' [J]."""
     acceleration: float
     """`Effort.acceleration`."""
     beyond_range: float
@@ -51,7 +51,9 @@ class EpisodeEffort:
 def episode_effort(
     series: dict[str, NDArray], body: Body, feet: Feet, first: int, last: int, muscle: Muscle = AS_IS
 ) -> EpisodeEffort | None:
-    """Measure the effort of one episode in the ticks from `first` up to `last`; None for less than 3 ticks.
+    """Measure the use of the muscles in one episode, from tick `first` up to `last`; None for less than 3 ticks.
+
+    The first and the last of these ticks are left out: the fibres' work in a tick needs its neighbours.
 
     Args:
         series: name -> (T, ...), as in a recording.
@@ -83,8 +85,11 @@ def episode_effort(
 
 
 def mean_effort(episodes: Sequence[EpisodeEffort], body: Body) -> Effort | None:
-    """Return the effort of several episodes of one body together; None if it does not move forward."""
-    total = _Total.of(episodes)
+    """Return the effort of a body over all its `episodes` together; None if the body does not move forward.
+
+    Rates are means over time; `beyond_range` is the largest of any episode.
+    """
+    total = _EpisodeSums.of(episodes)
     if total.distance <= 0.0:
         return None
     return Effort(
@@ -108,12 +113,15 @@ def effort_numbers(episodes: Sequence[EpisodeEffort], body: Body) -> dict[str, A
             "per_joint": dict.fromkeys(JOINTS, nothing),
             "per_leg": dict.fromkeys(SIDES, nothing),
         }
-    total = _Total.of(episodes)
-    # Of the body alone, as people's costs are told; `mean_effort` has the weight with load, which the muscles carry.
+    total = _EpisodeSums.of(episodes)
+    # Of the body alone, as people's costs are stated; `mean_effort` has the weight with load, which the muscles carry.
     per_kg_and_metre = 1.0 / (body.mass * total.distance)
 
     def numbers_of(energy: NDArray, net_energy: NDArray, activation: NDArray) -> dict[str, float]:
-        """Return the numbers of the legs and joints whose sums over the episodes are given."""
+        """Return fibre work and net joint work per kg and metre, and mean activation, of some legs and joints together.
+
+        The arguments are their sums over the episodes: of energies [J], and of activation over time [s].
+        """
         return {
             "fibre_J_kg_m": float(energy.sum() * per_kg_and_metre),
             "net_joint_J_kg_m": float(net_energy.sum() * per_kg_and_metre),
@@ -132,8 +140,10 @@ def effort_numbers(episodes: Sequence[EpisodeEffort], body: Body) -> dict[str, A
 
 
 def cost_of_transport(work: float, mass: float, distance: float) -> float | None:
-    """Return positive joint work [J] of both legs over body weight and distance, dimensionless; None without
-    progress, and for work that is not finite."""
+    """Return positive joint `work` [J] of both legs over the weight of `mass` [kg] and `distance` [m], dimensionless.
+
+    None without progress, and for work that is not finite.
+    """
     cost = work / (mass * GRAVITY * distance) if distance > 0 else nan
     return float(cost) if isfinite(cost) else None
 
@@ -148,19 +158,23 @@ def stiffness_charge(recording: Recording, factor: float = 1.0) -> float:
     if settings.ankle_tendon is None:
         raise SpringfootError("stiffness_charge needs a recording with ankle_tendon, got None")
     scale = body_of(settings).strength_scale
-    every = round(settings.step_seconds / TICK)
-    at_ends = {name: values[:, every - 1 :: every].astype(float) for name, values in recording.series.items()}
+    ticks_per_step = round(settings.step_seconds / TICK)
+    at_ends = {
+        name: values[:, ticks_per_step - 1 :: ticks_per_step].astype(float) for name, values in recording.series.items()
+    }
     angle = at_ends["angle"]
     tissue = scale * ankle_tissue_stiffness(angle[..., KNEE], angle[..., ANKLE])
     ankle, toe = np.moveaxis(at_ends["stiffness"], -1, 0)
     torque = at_ends["fibre_moment"][..., ANKLE]
-    ankle = charged_calf_stiffness(ankle, tissue, torque, settings.ankle_tendon, scale, factor * STIFFNESS_PER_TORQUE)
-    squares = (ankle / ANKLE_STIFFNESS_UNIT) ** 2 + TOE_SHARE * (toe / TOE_STIFFNESS_UNIT) ** 2
+    charged_ankle = charged_calf_stiffness(
+        ankle, tissue, torque, settings.ankle_tendon, scale, factor * STIFFNESS_PER_TORQUE
+    )
+    squares = (charged_ankle / ANKLE_STIFFNESS_UNIT) ** 2 + TOE_SHARE * (toe / TOE_STIFFNESS_UNIT) ** 2
     return float(np.nanmean(squares) / (1.0 + TOE_SHARE) / scale**2)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class _Total:
+class _EpisodeSums:
     """Sums over episodes; arrays (side, joint)."""
 
     seconds: float
@@ -170,8 +184,8 @@ class _Total:
     activation: NDArray
 
     @classmethod
-    def of(cls, episodes: Sequence[EpisodeEffort]) -> "_Total":
-        """Return the sums of `episodes`."""
+    def of(cls, episodes: Sequence[EpisodeEffort]) -> "_EpisodeSums":
+        """Return the sums over `episodes`, 0 for none."""
         zero = np.zeros((len(SIDES), len(JOINTS)))
         return cls(
             seconds=sum(episode.seconds for episode in episodes),

@@ -25,7 +25,8 @@ _PHASE = PERCENT / 100
 
 
 def angle_numbers(curve: NDArray, human: HumanGait, joint: str) -> Numbers:
-    """Return the likeness of a joint's angle [deg] to people's."""
+    """Return how far the mean curve of a joint's angle (101,) [deg] is from the mean of `human`: RMSE, correlation, and
+    percent of the stride within one SD."""
     people = np.degrees(human.mean(joint, _PHASE))
     return {
         "rmse_deg": score.rmse(curve, people),
@@ -35,7 +36,10 @@ def angle_numbers(curve: NDArray, human: HumanGait, joint: str) -> Numbers:
 
 
 def moment_numbers(curve: NDArray, human: HumanGait, joint: str) -> Numbers:
-    """Return peaks of a joint's moment [N m/kg], and its likeness to people's; people's toe moment is unknown."""
+    """Return peaks of the mean curve of a joint's moment (101,) [N m/kg], and its likeness to that of `human`.
+
+    The likeness, correlation and percent within two SD, is None for the toe, of which people's moment is unknown.
+    """
     peak, percent = score.largest(curve)
     late_swing, _ = score.largest(curve[LATE_SWING_PERCENT:])
     numbers: Numbers = {"peak_Nm_kg": peak, "peak_percent": percent, "late_swing_peak_Nm_kg": late_swing}
@@ -67,10 +71,11 @@ def force_numbers(vertical: NDArray, forward: NDArray, human: HumanGait) -> Numb
 
 
 def gait_numbers(curves: Mapping[str, NDArray], human: HumanGait) -> dict[str, Numbers]:
-    """Return the likeness of a mean gait to people's: joint, `grf` or moment -> its numbers, of curves that are there.
+    """Return the likeness of a mean gait to people's: joint, `grf` or moment -> its numbers.
 
-    `curves` are those of `HumanGait`, in its units and signs. The numbers are named as in metrics.json; beside them
-    stand RMSE in people's SD and of forces, in which some publications count.
+    `curves` are named as those of `HumanGait`, in its units and signs; numbers of missing ones are left out.
+    The numbers are named as in metrics.json; beside them stand RMSE in people's SD and of forces, in which some
+    publications count.
     """
     numbers: dict[str, Numbers] = {}
     for joint in ANGLE_JOINTS:

@@ -65,7 +65,7 @@ class Gait:
 def measure(recording: Recording, muscle: Muscle = AS_IS) -> Gait:
     """Compute every number of metrics.json and the mean curves, from the recording alone.
 
-    `muscle` has factors on properties of the muscles whose effort is told.
+    `muscle` has factors on properties of the muscles whose effort is measured.
     """
     tally = tally_strides(recording, muscle)
     return Gait(metrics=_metrics(recording, tally), tally=tally)
@@ -84,8 +84,10 @@ def _metrics(recording: Recording, tally: StrideTally) -> dict[str, Any]:
     legs = leg_numbers(tally) if feet_differ(settings) else None
 
     def stiffness(name: str) -> dict[str, Any]:
-        """Return the entry of ankle or toe in `stiffness_Nm_rad`: mean K in each part of the stride, where one leg's
-        joint is locked, of the other alone."""
+        """Return the entry `name`, ankle or toe, of `stiffness_Nm_rad`: mean K of both legs in each part of the stride.
+
+        If one leg's joint is locked, it is the mean of the other leg alone.
+        """
         free = [side for side, foot in zip(SIDES, settings.feet, strict=True) if not getattr(foot, name).is_locked]
         if legs is not None and len(free) == 1:
             return legs[free[0]]["stiffness_Nm_rad"][name]

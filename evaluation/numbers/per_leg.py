@@ -52,13 +52,13 @@ def _leg_metrics(tally: StrideTally, side: int) -> dict[str, Any]:
     curves = tally.feet[side]
     of_side = np.array(tally.stride_sides, int) == side  # strides of this leg
     features = score.force_features(curves.mean("grf_vertical_bw"), curves.mean("grf_forward_bw"))
-    work = _of_chosen(tally.joint_work, of_side)
-    stance = _mean(_of_chosen(tally.toe_off, of_side))
+    work = _select(tally.joint_work, of_side)
+    stance = _mean(_select(tally.toe_off, of_side))
     # Steps that this leg makes: they begin as it pushes off and the other leg lands.
     swings = np.array(tally.step_sides, int) == side
     return {
         "strides": int(of_side.sum()),
-        "step_length_m": _mean(_of_chosen(tally.step_length, swings)),
+        "step_length_m": _mean(_select(tally.step_length, swings)),
         "stance_percent": stance,
         "joint_range_deg": {
             joint: float(np.ptp(curves.mean(column))) if curves.count else None
@@ -66,7 +66,7 @@ def _leg_metrics(tally: StrideTally, side: int) -> dict[str, Any]:
         },
         "vertical_peak1_bw": features.vertical_peak1,
         "vertical_peak2_bw": features.vertical_peak2,
-        "vertical_max_mean_bw": _mean(_of_chosen(tally.vertical_max, of_side)),
+        "vertical_max_mean_bw": _mean(_select(tally.vertical_max, of_side)),
         "braking_peak_bw": features.braking_peak,
         "forward_peak_bw": features.forward_peak,
         "joint_work_J_kg": {
@@ -74,10 +74,10 @@ def _leg_metrics(tally: StrideTally, side: int) -> dict[str, Any]:
             for index, joint in enumerate(JOINTS)
         },
         "com_work_J_kg": {
-            "push_off": _mean(_of_chosen(tally.push_off, swings)),
-            "collision": _mean(_of_chosen(tally.collision, ~swings)),  # of the leg that lands: in the other leg's steps
+            "push_off": _mean(_select(tally.push_off, swings)),
+            "collision": _mean(_select(tally.collision, ~swings)),  # of the leg that lands: in the other leg's steps
         },
-        "toe_clearance_m": float(np.median(_of_chosen(tally.clearance, of_side))) if of_side.any() else None,
+        "toe_clearance_m": float(np.median(_select(tally.clearance, of_side))) if of_side.any() else None,
         "stiffness_Nm_rad": {
             name: score.phase_means(
                 curves.mean(f"{name}_stiffness_Nm_per_rad"), USUAL_TOE_OFF if stance is None else stance
@@ -87,9 +87,9 @@ def _leg_metrics(tally: StrideTally, side: int) -> dict[str, Any]:
     }
 
 
-def _of_chosen(values: list[Any], chosen: NDArray) -> NDArray:
-    """Return those of n values, as an array, for which `chosen` (n,) is True."""
-    return np.array(values)[chosen] if len(values) else np.empty(0)
+def _select(values: list[Any], mask: NDArray) -> NDArray:
+    """Return those of n values, as an array, for which `mask` (n,) is True."""
+    return np.array(values)[mask] if len(values) else np.empty(0)
 
 
 def _mean(values: NDArray) -> float | None:
@@ -109,5 +109,5 @@ def _joint_work(work: NDArray, joint: int) -> tuple[float | None, float | None]:
 
 
 def _relative_difference(left: float | None, right: float | None) -> float | None:
-    """Return the right leg's number less the left's, over their mean; None if one is missing."""
+    """Return the right leg's number less the left's, over their mean, dimensionless; None if either is missing."""
     return None if left is None or right is None else 2 * (right - left) / (right + left)

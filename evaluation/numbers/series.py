@@ -69,13 +69,14 @@ def strides_within(foot: Contacts, steady: tuple[float, float]) -> NDArray:
 def stride_curves(series: dict[str, NDArray], side: int, body: Body, strides: NDArray) -> NDArray:
     """Return one leg's curves over percent of its strides, (S, 101, C) in the order of `GAIT_CYCLE_COLUMNS`.
 
-    `series` are those of one episode, `side` is 0 left, 1 right, `strides` (S, 3) as of `strides_within`.
+    `series` are those of one episode, `side` is 0 left, 1 right, `strides` (S, 3) as of `strides_within`. Curves are
+    interpolated between the 100 Hz samples.
     """
     begin, _, end = strides.T
     return np.concatenate(
         [
-            on_percent(_states(series, side, body), begin, end, TICK, first=TICK),
-            on_percent(_means(series, side, body), begin, end, TICK, first=TICK / 2),
+            on_percent(_state_curves(series, side, body), begin, end, TICK, first=TICK),
+            on_percent(_mean_curves(series, side, body), begin, end, TICK, first=TICK / 2),
         ],
         axis=-1,
     )[..., _ORDER]
@@ -86,8 +87,9 @@ def mid_tick(state: NDArray) -> NDArray:
     return np.concatenate([state[:1], 0.5 * (state[1:] + state[:-1])])
 
 
-def _states(series: dict[str, NDArray], side: int, body: Body) -> NDArray:
-    """Return one leg's curves that are known at the end of each tick, (T, C) in the order of `_STATES`."""
+def _state_curves(series: dict[str, NDArray], side: int, body: Body) -> NDArray:
+    """Return the curves of the leg `side` that are states at the end of each of T ticks, (T, C) in the order of
+    `_STATES`."""
     angle = np.degrees(series["angle"][:, side])
     pitch = np.degrees(series["base"][:, 2])  # of the trunk
     thigh = angle[:, HIP] - pitch
@@ -107,8 +109,8 @@ def _states(series: dict[str, NDArray], side: int, body: Body) -> NDArray:
     )
 
 
-def _means(series: dict[str, NDArray], side: int, body: Body) -> NDArray:
-    """Return one leg's curves that are means over ticks, (T, C) in the order of `_MEANS`."""
+def _mean_curves(series: dict[str, NDArray], side: int, body: Body) -> NDArray:
+    """Return the curves of the leg `side` that are means over each of T ticks, (T, C) in the order of `_MEANS`."""
     forward, vertical = series["force"][:, side].sum(axis=1).T / (body.mass * GRAVITY)
     moment = -series["joint_torque"][:, side] / body.mass  # internal: extension and plantarflexion positive
     power = series["joint_work"][:, side].sum(axis=-1) / TICK / body.mass  # positive and negative work together

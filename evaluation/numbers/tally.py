@@ -85,7 +85,7 @@ class StrideTally:
     energy: list[NDArray] = field(default_factory=list)
     """Change of each entry of the body's ledger (`springfoot.envs.physics.energy`) in each stride [J/kg]."""
     effort: list[EpisodeEffort] = field(default_factory=list)
-    """Price of each episode to the muscles."""
+    """Use of the muscles in each episode of at least 3 steady ticks."""
     push_off: list[float] = field(default_factory=list)
     """Positive work of the trailing leg's force on the CoM in the double support of each step [J/kg]."""
     collision: list[float] = field(default_factory=list)
@@ -160,8 +160,8 @@ def add_episode(
         tally.stride_sides += [side] * len(strides)
         tally.stride_time += list(next_heel_strike - heel_strike)
         tally.toe_off += list((toe_off - heel_strike) / (next_heel_strike - heel_strike) * 100)
-        tally.joint_work += list(_sums(series["joint_work"][:, side], heel_strike, next_heel_strike) / body.mass)
-        tally.energy += list(_energies(series["energy"], heel_strike, next_heel_strike) / body.mass)
+        tally.joint_work += list(_sum_between(series["joint_work"][:, side], heel_strike, next_heel_strike) / body.mass)
+        tally.energy += list(_stride_energies(series["energy"], heel_strike, next_heel_strike) / body.mass)
         contact = series["contact"][:, side]
         load = series["force"][:, side, :, 1]  # (T, contact), vertical [N]
         # Largest force, slip in stance and clearance in mid-swing of each stride, by ticks.
@@ -197,7 +197,7 @@ def _add_steps(
         cop = _centre_of_pressure(series) - mid_tick(series["ankle"][:, side, 0])
         tally.cop.add(on_percent(cop[:, None], begin, end, TICK, first=TICK / 2))
         tally.reward.add(on_percent(series[REWARD], begin, end, TICK, first=TICK))
-        # Step length: the place at which the other foot lands at the step's end, less this one's at the step's start.
+        # Step length: x of the other foot, which lands at the step's end, less x of this foot at the step's start.
         begin_tick, end_tick = np.floor(np.stack([begin, end]) / TICK).astype(int)
         ankle_x = series["ankle"][..., 0]
         tally.step_length += list(ankle_x[end_tick, 1 - side] - ankle_x[begin_tick, side])
@@ -207,7 +207,7 @@ def _add_steps(
         both_on_ground = next_after(contacts[1 - side].toe_offs, begin) - begin  # [s]
         both_on_ground = np.where(both_on_ground < end - begin, both_on_ground, 0.0)
         tally.double_support += list(both_on_ground)
-        work = _sums(com_work, begin, begin + both_on_ground)  # (step, side, (positive, negative))
+        work = _sum_between(com_work, begin, begin + both_on_ground)  # (step, side, (positive, negative))
         tally.push_off += list(work[:, 1 - side, 0])
         tally.collision += list(-work[:, side, 1])
 
@@ -224,10 +224,10 @@ def _com_work(series: dict[str, NDArray], settings: BipedSettings) -> NDArray:
     return np.stack([np.maximum(work, 0.0), np.minimum(work, 0.0)], -1)
 
 
-def _sums(per_tick: NDArray, begin: NDArray, end: NDArray) -> NDArray:
-    """Sum values per tick (T, ...) over S strides, from `begin` to `end` (S,) [s]; return (S, ...).
+def _sum_between(per_tick: NDArray, begin: NDArray, end: NDArray) -> NDArray:
+    """Sum values per tick (T, ...) over S spans of time, from `begin` to `end` (S,) [s]; return (S, ...).
 
-    A tick that a stride's end cuts counts by the fraction of it that lies within the stride.
+    A tick that an end of a span cuts counts by the fraction of it that lies within the span.
     """
     # Row k is the sum of the ticks before tick k.
     sum_before = np.concatenate([np.zeros((1, *per_tick.shape[1:])), np.cumsum(per_tick, axis=0)])
@@ -242,7 +242,7 @@ def _sums(per_tick: NDArray, begin: NDArray, end: NDArray) -> NDArray:
     return sum_until(end) - sum_until(begin)
 
 
-def _energies(energy: NDArray, begin: NDArray, end: NDArray) -> NDArray:
+def _stride_energies(energy: NDArray, begin: NDArray, end: NDArray) -> NDArray:
     """Return each stride's energy ledger (S, entries) [J]: works, and the rise of mechanical energy.
 
     `energy` (T, entries) is the ledger of each tick, with the mechanical energy at its end; strides last from `begin`
@@ -251,7 +251,7 @@ def _energies(energy: NDArray, begin: NDArray, end: NDArray) -> NDArray:
     flow = energy.copy()
     mechanical = ledger_entries().index("mechanical")
     flow[1:, mechanical] = np.diff(energy[:, mechanical])  # the first tick's change is unknown; no stride is in it
-    return _sums(flow, begin, end)
+    return _sum_between(flow, begin, end)
 
 
 def _centre_of_pressure(series: dict[str, NDArray]) -> NDArray:

@@ -54,7 +54,7 @@ class WalkedEpisode:
 
 
 def set_id(name: str) -> str:
-    """Return the id under which Minari finds a set."""
+    """Return the id under which Minari finds the set `name` of `SETS`, such as `springfoot/walk/expert-v0`."""
     return f"{NAMESPACE}/{name}-v0"
 
 
@@ -64,11 +64,11 @@ def walked_episodes(settings: BipedSettings, policy: PolicyFunction, episodes: i
     while len(walked) < episodes:
         count = min(_BATCH, episodes - len(walked))
         seeds = [seed + number for number in range(len(walked), len(walked) + count)]
-        walked += _walked_batch(Biped(settings, count), policy, seeds)
+        walked += _walk_batch(Biped(settings, count), policy, seeds)
     return walked
 
 
-def _walked_batch(biped: Biped, policy: PolicyFunction, seeds: list[int]) -> list[WalkedEpisode]:
+def _walk_batch(biped: Biped, policy: PolicyFunction, seeds: list[int]) -> list[WalkedEpisode]:
     """Walk one episode in each environment of `biped`, seeded by `seeds`; return the episodes.
 
     All environments step until the last episode ends; each episode is then cut to its own steps.

@@ -77,21 +77,21 @@ def decisions_of(
     samples = samples[(samples * TICK >= begin + WARM_UP) & (samples * TICK < end)]
     if sides is None:
         sides = deciding_legs(recording.settings) or [LEFT, RIGHT]
-    chosen = np.ix_(range(len(recording.ticks)), samples, sides)  # (episode, decision, side)
-    phase = recording.series["phase"][chosen].ravel().astype(float)  # at the tick's beginning, when K was decided
+    at_decisions = np.ix_(range(len(recording.ticks)), samples, sides)  # (episode, decision, side)
+    phase = recording.series["phase"][at_decisions].ravel().astype(float)  # at the tick's beginning, when K was decided
     values, stiffness = (
-        recording.series[name][chosen].reshape(-1, len(SPRINGS)).astype(float) for name in (series, "stiffness")
+        recording.series[name][at_decisions].reshape(-1, len(SPRINGS)).astype(float) for name in (series, "stiffness")
     )
     usable = np.isfinite(phase) & np.isfinite(values).all(-1) & (stiffness > 0.0).all(-1)
     return phase[usable] % 1.0, values[usable]
 
 
 def mean_over_phase(phase: NDArray, values: NDArray) -> NDArray:
-    """Return the mean of `values` (n, C) over the phase, as a periodic curve: its values at `MEAN_KNOTS` even phases,
-    (MEAN_KNOTS, C).
+    """Return the mean of n values of C quantities over the phase, as periodic curves: their values at `MEAN_KNOTS` even
+    phases, (MEAN_KNOTS, C).
 
-    `phase` (n,) is that of each value, in [0, 1). The curve is linear between its knots, and fitted by least squares
-    with a price on curvature (`SMOOTHING`).
+    `values` is (n, C), `phase` (n,) their phases in [0, 1). A curve is linear between its knots, and fitted by least
+    squares with a penalty on curvature (`SMOOTHING`).
     """
     # Each value lies between two knots, whose weights are 1 - fraction and fraction.
     knot = np.minimum((phase * MEAN_KNOTS).astype(int), MEAN_KNOTS - 1)
@@ -119,8 +119,8 @@ def mean_over_phase(phase: NDArray, values: NDArray) -> NDArray:
 def _mean_stiffness(phase: NDArray, stiffness: NDArray) -> NDArray:
     """Return the mean K over the stride on `GRID`, (SAMPLES, 2) [N m/rad], of n decisions.
 
-    `phase` (n,) in [0, 1) and `stiffness` (n, 2) [N m/rad] are those of the decisions. The fitted curve can overshoot
-    them, so it is clipped to their range.
+    `phase` (n,) in [0, 1) and `stiffness` (n, 2) [N m/rad], ankle and toe, are those of the decisions. The curve of
+    `mean_over_phase` can overshoot them, so it is clipped to their range; between its knots it is linear.
     """
     knots = np.clip(mean_over_phase(phase, stiffness), stiffness.min(0), stiffness.max(0))
     knot_phases = np.arange(MEAN_KNOTS) / MEAN_KNOTS
@@ -177,7 +177,7 @@ def open_loop_copy(
         raise SpringfootError(f"{name} has no open-loop copy: it moves the legs too (acts {settings.acts!r})")
     undisturbed = replace(settings, **(UNDISTURBED | dict.fromkeys(DRAWN_SETTINGS)))
     groups = alike_legs(settings)
-    # Group of each side. A leg with a device is in none, and follows no K: it is given that of the other leg.
+    # Group of each side. A leg with a device is in none, and follows no K: the other leg's stands in.
     group_of = [next((number for number, legs in enumerate(groups) if side in legs), 0) for side in range(len(SIDES))]
     means: dict[float, NDArray] = {}  # by speed; without the speeds at which the policy walks no strides
     speeds = tabulated_speeds(settings).tolist()

@@ -76,8 +76,8 @@ def _frozen_copy(name: str, given: dict[str, Any], threads: int, watch: Watch) -
     """Return the open-loop copy `frozen:POLICY`, called `name`, and its settings; arguments as in
     `policy_and_settings`.
 
-    A setting `decisions` in `given` is the copy's alone: for the mean K the policy walks with its own. Raises
-    `SpringfootError` without a policy to copy, and for one that is its own copy.
+    A setting `decisions` in `given` holds for the copy alone: the policy decides as in its training while its mean K is
+    measured. Raises `SpringfootError` without a policy to copy, and for a policy without feedback.
     """
     copied = name.partition(":")[2]
     if not copied:

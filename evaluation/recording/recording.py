@@ -119,7 +119,7 @@ class Recording:
         )
 
     def shown(self) -> dict[str, NDArray]:
-        """Return name -> (T, ...) float64 series of the `example`, without the samples after its end."""
+        """Return name -> (T, ...) float64 series of the episode `example` alone, its T samples before its end."""
         episode = self.example
         return {name: values[episode, : self.ticks[episode]].astype(float) for name, values in self.series.items()}
 
@@ -242,11 +242,11 @@ def record_each(
     kept = record_all(policy, settings, seeds, given=drawn, threads=threads, progress=progress)
     recordings = []
     for index in range(episodes):
-        fixed = {key: float(values[index]) for key, values in drawn.items()} | dict.fromkeys(DRAWN_SETTINGS)
-        own_settings = replace(settings, **fixed)
-        course: dict[str, Any] = planned_course(reference_walk_at(own_settings, own_settings.speed).plan)
+        body_and_speed = {key: float(values[index]) for key, values in drawn.items()} | dict.fromkeys(DRAWN_SETTINGS)
+        of_episode = replace(settings, **body_and_speed)
+        course: dict[str, Any] = planned_course(reference_walk_at(of_episode, of_episode.speed).plan)
         rows = slice(index, index + 1)
-        recordings.append(Recording(policy=name, settings=own_settings, seed=seed + index, **kept.of(rows), **course))
+        recordings.append(Recording(policy=name, settings=of_episode, seed=seed + index, **kept.of(rows), **course))
     return recordings
 
 
@@ -266,7 +266,7 @@ def record_feet(
     `feet` are settings of one foot or both, such as `{"right_foot": "passive"}`. Returns a recording for each. Episode
     i on each of them is from seed `seed` + i.
     """
-    settings_by_feet = [replace(settings, **one) for one in feet]
+    settings_by_feet = [replace(settings, **foot_settings) for foot_settings in feet]
     # One walk after another: all episodes on the first feet, then all on the next.
     feet_of_episodes = [on_feet.feet for on_feet in settings_by_feet for _ in range(episodes)]
     seeds = [seed + episode for _ in settings_by_feet for episode in range(episodes)]
@@ -299,7 +299,7 @@ def record_policies(
     recordings = []
     for first in range(0, len(names), together):
         batch = names[first : first + together]
-        act = _side_by_side([policies[name] for name in batch])
+        act = _join_policies([policies[name] for name in batch])
         kept = record_all(act, settings, [*seeds] * len(batch), threads=threads, progress=progress)
         for index, name in enumerate(batch):
             rows = slice(index * episodes, (index + 1) * episodes)
@@ -307,16 +307,18 @@ def record_policies(
     return recordings
 
 
-def _side_by_side(policies: Sequence[PolicyFunction]) -> PolicyFunction:
-    """Return the policy that acts as each of several in its own environments: equally many, one policy after
-    another."""
+def _join_policies(policies: Sequence[PolicyFunction]) -> PolicyFunction:
+    """Return one policy for a batch that several policies walk in side by side.
+
+    The first of P policies acts in the first N / P of the N environments, and so on; all act as they do alone.
+    """
     if len(policies) == 1:
         return policies[0]
 
     def act(observation: NDArray) -> NDArray:
-        """Return the actions (N, D) of each policy on its rows of the observations (N, ...)."""
-        own = np.split(observation, len(policies))
-        return np.concatenate([policy(rows) for policy, rows in zip(policies, own, strict=True)])
+        """Return the actions (N, A) for observations (N, D), each policy's on its rows."""
+        parts = np.split(observation, len(policies))
+        return np.concatenate([policy(part) for policy, part in zip(policies, parts, strict=True)])
 
     return act
 
@@ -357,7 +359,8 @@ class Episodes:
         return cls.empty(count, round(step / TICK) * steps)
 
     def of(self, rows: slice) -> dict[str, Any]:
-        """Return the fields of a `Recording` that belong to episodes, for the episodes `rows`."""
+        """Return name -> value of those fields of a `Recording` that have an axis of episodes, for the episodes `rows`
+        alone."""
         return {
             "ticks": self.ticks[rows],
             "returns": self.returns[rows],
@@ -393,7 +396,7 @@ def record_walk(
     ticks = kept.ticks[rows]
 
     def keep(tick: Tick) -> None:
-        """Write the tick's values into all series, NaN for episodes that have ended."""
+        """Write the tick's values into all series, which the first tick creates; NaN for episodes that have ended."""
         index = int(ticks.max())  # episodes begin together: the longest one has no gap
         for name, take in SERIES.items():
             value = take(tick)

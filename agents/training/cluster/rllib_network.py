@@ -41,16 +41,17 @@ class ActorCritic(TorchRLModule, ValueFunctionAPI):
         self.log_std = nn.Parameter(torch.full((actions,), float(config["log_std"])))
 
     def _forward(self, batch: dict[str, Any], **_: Any) -> dict[str, Any]:
-        """Return the inputs of the action distribution (N, 8): four means, then four log standard deviations."""
-        mean = self.actor(self._normalized(batch))
+        """Return the inputs of the distribution of A actions, (N, 2 A): A means, then A log standard deviations."""
+        mean = self.actor(self._normalized_observations(batch))
         return {Columns.ACTION_DIST_INPUTS: torch.cat([mean, self.log_std.expand_as(mean)], dim=-1)}
 
     def compute_values(self, batch: dict[str, Any], embeddings: Any = None) -> torch.Tensor:
         """Return the critic's values (N,) of the observations of a batch."""
-        return self.critic(self._normalized(batch)).squeeze(-1)
+        return self.critic(self._normalized_observations(batch)).squeeze(-1)
 
-    def _normalized(self, batch: dict[str, Any]) -> torch.Tensor:
-        """Return the observations (N, D) of a batch, by mean and deviation, clipped."""
+    def _normalized_observations(self, batch: dict[str, Any]) -> torch.Tensor:
+        """Return the observations (N, D) of a batch less `mean`, over the root of `variance`, clipped to
+        ±`OBSERVATION_CLIP`."""
         centred = (batch[Columns.OBS] - self.mean) / torch.sqrt(self.variance + VARIANCE_FLOOR)
         return centred.clamp(-OBSERVATION_CLIP, OBSERVATION_CLIP)
 

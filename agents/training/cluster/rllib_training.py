@@ -77,8 +77,9 @@ class _ScaledRewards(gym.vector.VectorWrapper):
         return observation, reward * self._scale, terminated, truncated, {}
 
 
-def _batch(context: Mapping[str, Any]) -> gym.vector.VectorEnv:
-    """Make the environments of a runner from RLlib's `context`: their number, their settings, the reward's scale."""
+def _runner_environments(context: Mapping[str, Any]) -> gym.vector.VectorEnv:
+    """Return the environments of one runner as a batch, made from RLlib's `context`: their number, their settings, the
+    reward's scale."""
     return _ScaledRewards(SegmentedFootBipedVector(context["num_envs"], **context["settings"]), context["scale"])
 
 
@@ -121,7 +122,7 @@ def resume(
         record = read_record(out)
         if not is_of_rllib(record):
             raise SpringfootError(f"{out} was trained by another engine")
-        checkpoint = _newest(out)
+        checkpoint = _newest_checkpoint(out)
         past = {"sessions": [], "evaluations": []}
         past = read_object(checkpoint / _RECORD, "record of a checkpoint") if checkpoint else past
         try:
@@ -138,8 +139,8 @@ def resume(
         return _Run(config, out, past, runners, checkpoint).learn()
 
 
-def _newest(out: Path) -> Path | None:
-    """Return the folder of the newest checkpoint; None if there is none."""
+def _newest_checkpoint(out: Path) -> Path | None:
+    """Return the folder of the whole checkpoint with the most timesteps in the run's folder `out`; None without one."""
     numbers = [path.name.removeprefix(CHECKPOINT) for path in out.glob(f"{CHECKPOINT}*") if (path / _RECORD).is_file()]
     numbers = [number for number in numbers if number.isdecimal()]
     return out / f"{CHECKPOINT}{max(map(int, numbers))}" if numbers else None
@@ -195,7 +196,7 @@ class _Run:
             except Exception:
                 self._write_record("failed")
                 raise
-            self._write_record("finished" if self._finished else "interrupted")
+            self._write_record("finished" if self._is_finished else "interrupted")
         return self._record
 
     def _connect(self, stack: ExitStack) -> None:
@@ -217,11 +218,11 @@ class _Run:
             )
 
     def _build(self) -> Any:
-        """Return RLlib's PPO with the configuration's numbers."""
+        """Build RLlib's PPO with the configuration's numbers, and return it; its runners start with it."""
         config = self._config
         assert self._runners is not None
         torch.set_num_threads(1)
-        register_env(_ENVIRONMENT, _batch)
+        register_env(_ENVIRONMENT, _runner_environments)
         steps_of_20ms = config.environment.step_seconds / ACTION_STEP  # gamma and lambda are per 20 ms
         gamma = config.gamma**steps_of_20ms
         rollout_steps = max(1, config.update_steps // config.num_envs)
@@ -285,28 +286,31 @@ class _Run:
             self._trained = int(collected["num_env_steps_sampled_lifetime"])
             self._progress.advance(self._trained - before)
             runners = result["fault_tolerance"]
-            told = {
+            progress_numbers = {
                 "episode_return_mean": collected.get("episode_return_mean", np.nan),
                 "healthy_runners": runners["num_healthy_workers"],
                 "restarted_runners": runners["num_remote_worker_restarts"],
             }
-            for name, value in told.items():
+            for name, value in progress_numbers.items():
                 if np.isfinite(value):
                     self._writer.add_scalar(f"rllib/{name}", float(value), self._trained)
             session = self._record["sessions"][-1]
-            session |= {name: int(told[name]) for name in ("healthy_runners", "restarted_runners")}
-        if not self._stopping.asked and not self._finished:
+            session |= {name: int(progress_numbers[name]) for name in ("healthy_runners", "restarted_runners")}
+        if not self._stopping.asked and not self._is_finished:
             self._evaluate()
-        self._keep()
+        self._save()
 
     @property
-    def _finished(self) -> bool:
-        """Return True if all timesteps are done and evaluated."""
+    def _is_finished(self) -> bool:
+        """Return True if the configured timesteps are done, and the last evaluation is of the policy after them."""
         evaluations = self._record["evaluations"]
         return bool(evaluations) and evaluations[-1]["timesteps"] == self._trained >= self._config.timesteps
 
     def _policy(self) -> Policy:
-        """Return a copy of the actor as a policy that acts by its mean action."""
+        """Return a copy of the actor as a policy that acts by its mean action.
+
+        Entries of the observation that never varied in training are left out of the action.
+        """
         state = self._algorithm.learner_group.get_weights()[DEFAULT_MODULE_ID]
         layers = actor_layers(state)
         return ignoring_unvaried(
@@ -333,9 +337,9 @@ class _Run:
             self._writer.add_scalar(f"evaluation/{name}", entry[name], self._trained)
         self._writer.flush()
         self._progress.report(f"return {entry['return_mean']:.1f}, {entry['falls']} of {entry['episodes']} fell")
-        self._keep()
+        self._save()
 
-    def _keep(self) -> None:
+    def _save(self) -> None:
         """Write the newest policy, a checkpoint of Ray's and the record; remove older checkpoints."""
         save_policy(self._out / LAST, self._policy())
         checkpoint = self._out / f"{CHECKPOINT}{self._trained}"
