@@ -51,7 +51,7 @@ def completion_main(arguments: Sequence[str], installed_studies: Callable[[], di
             print(HELP)
             return 0
         case [shell] if shell in get_args(Shell):
-            print(SPECIFICATION.sub(_mended, _script_of_tyro(shell, installed_studies())))
+            print(SPECIFICATION.sub(_completed_specification, _script_of_tyro(shell, installed_studies())))
             if shell == "bash":
                 print(FILES_TOO)
         case _:
@@ -81,10 +81,10 @@ def _script_of_tyro(shell: str, studies: dict[str, Any]) -> str:
     return output.getvalue()
 
 
-def _mended(line: re.Match[str]) -> str:
-    """Return the line of the specification with names of policies and shells, and with each description on one line.
+def _completed_specification(line: re.Match[str]) -> str:
+    """Return the line COMPLETION_SPEC of a script of tyro's, with the names of policies and shells added to it.
 
-    The scripts take every line that tyro's Python code prints for a word to offer.
+    Each description in it comes on one line: the scripts offer every line that tyro's code prints as a word.
     """
     from springfoot.agents.policies.baselines import BASELINES  # not above: other commands need no simulator
     from springfoot.agents.policies.policy import SHIPPED
@@ -120,12 +120,12 @@ def _all_commands(studies: dict[str, Any]) -> Any:
     for name, path in COMMANDS.items():
         module, _, flags = path.partition(".")
         commands[name] = getattr(import_module(f"springfoot.cli.{module}"), flags)
-    commands["study"] = make_dataclass("StudyCommand", [("study", _one_of(studies))])
+    commands["study"] = make_dataclass("StudyCommand", [("study", _union_of(studies))])
     commands["completion"] = make_dataclass("CompletionCommand", [])  # it has no flags
-    return _one_of(commands)
+    return _union_of(commands)
 
 
-def _one_of(commands: dict[str, Any]) -> Any:
+def _union_of(commands: dict[str, Any]) -> Any:
     """Return a union for tyro, in which each class of flags is the command of its name; `commands` is name -> class."""
     return Union[  # noqa: UP007  (made at run time)
         tuple(Annotated[flags, tyro.conf.subcommand(name, prefix_name=False)] for name, flags in commands.items())

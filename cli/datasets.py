@@ -28,7 +28,7 @@ class DatasetsFlags:
 
 
 def datasets_main(arguments: Sequence[str] | None = None, program: str = "springfoot datasets") -> int:
-    """Write the sets; return 0, 2 for bad input, 130 after Ctrl-C."""
+    """Run the command line; return its exit code: 0 written, 2 bad input, 130 ended by Ctrl-C."""
     flags = parse(DatasetsFlags, arguments, program)
     return exit_code(program, lambda: run_datasets(flags))
 

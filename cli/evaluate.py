@@ -105,7 +105,7 @@ def run_evaluation(flags: EvaluateFlags, program: str, command: str = "") -> Non
     # Find every policy, before anything is written.
     prepared = []  # policy and settings of each
     for label, name in zip(labels, flags.policies, strict=True):
-        with _bar(f"{label}, copying", 0.0, delay=0.5) as bar:
+        with _progress_bar(f"{label}, copying", 0.0, delay=0.5) as bar:
             prepared.append(policies.policy_and_settings(name, settings, flags.seed, flags.threads, _watch_of(bar)))
     for _, environment in prepared:
         recording.require_recordable(environment, flags.episodes)
@@ -116,7 +116,7 @@ def run_evaluation(flags: EvaluateFlags, program: str, command: str = "") -> Non
         walks = []
         written = set[str]()
         for label, (policy, environment) in zip(labels, prepared, strict=True):
-            with _bar(label, flags.episodes * environment.episode_seconds) as bar:
+            with _progress_bar(label, flags.episodes * environment.episode_seconds) as bar:
                 episodes = recording.record(
                     policy,
                     environment,
@@ -128,11 +128,11 @@ def run_evaluation(flags: EvaluateFlags, program: str, command: str = "") -> Non
                 )
             policy_folder = folder if len(labels) == 1 else folder / label
             policy_folder.mkdir(exist_ok=policy_folder == folder)  # of a single policy it exists already
-            with _bar(f"{label}, files", 1.0, delay=0.5) as bar:
+            with _progress_bar(f"{label}, files", 1.0, delay=0.5) as bar:
                 gait = metrics.measure(episodes)
                 report.write_report(policy_folder, episodes, gait, bar.update)
             if flags.film:
-                with _bar(f"{label}, film", film.film_seconds(episodes)) as bar:
+                with _progress_bar(f"{label}, film", film.film_seconds(episodes)) as bar:
                     film.save_film(policy_folder / "walk.mp4", episodes, bar.update)
             walks.append((episodes, gait))
             written |= {path.name for path in policy_folder.iterdir()}
@@ -156,7 +156,7 @@ def run_evaluation(flags: EvaluateFlags, program: str, command: str = "") -> Non
     gait_table.print_results(out, [*["report.html"] * flags.report, per_policy])
 
 
-def _bar(words: str, total: float, delay: float = 0.0) -> tqdm:
+def _progress_bar(words: str, total: float, delay: float = 0.0) -> tqdm:
     """Return a progress bar named by `words`, of `total` units, with the time left.
 
     It appears only after `delay` [s], disappears at its end, and shows nothing without a terminal.

@@ -119,7 +119,7 @@ def run_training(flags: TrainFlags) -> int:
     best = record["best"]
     print(f"\n{record['timesteps']:,} steps in {record['seconds']:.0f} s, {record['status']}.")
     if best:
-        falls = f"{best['falls']} of {best['episodes']} episodes {_fell_under(record)}"
+        falls = f"{best['falls']} of {best['episodes']} episodes {_fall_conditions(record)}"
         print(f"Best:    return {best['return_mean']:.1f}, {falls}, after {best['timesteps']:,} steps")
         if not best["timesteps"]:
             print("         It is the policy that training began with: train longer, or try last.safetensors.")
@@ -134,8 +134,8 @@ def next_lines(record: dict[str, Any], folder: Path) -> list[str]:
 
     environment = record["config"]["environment"]
     standard = settings_to_json(BipedSettings())
-    evaluate = f"springfoot evaluate {_quoted(folder)}"
-    resume = f"springfoot train --resume {_quoted(folder)}"
+    evaluate = f"springfoot evaluate {_quoted_path(folder)}"
+    resume = f"springfoot train --resume {_quoted_path(folder)}"
     interrupted = record["status"] == "interrupted"
     first, *later = evaluations_of_one_task(record) or [{}]
     if later and later[-1]["return_mean"] <= first["return_mean"]:
@@ -205,10 +205,10 @@ def run_seeds(config: TrainingConfig, out: Path, count: int) -> int:
     end_in_order()
     record = multi_seed.train_seeds(config, out, count)
     print(f"\n{multi_seed.training_table(record)}\n")
-    print(f"Falls:   episodes that {_fell_under(record)}")
+    print(f"Falls:   episodes that {_fall_conditions(record)}")
     files = "best.safetensors, last.safetensors, run.json, TensorBoard"
     print(f"Results: {out} ({multi_seed.SEEDS}, and in each seed-N: {files})")
-    print(f"Next:    springfoot study compare {_quoted(out)}/seed-* --no-springs")
+    print(f"Next:    springfoot study compare {_quoted_path(out)}/seed-* --no-springs")
     folders = [out / row["folder"] for row in record["seeds"] if row["status"] != "finished"]
     if begun := [folder for folder in folders if (folder / RUN).is_file()]:
         print(f"Or:      {_for_folders('springfoot train --resume', begun)}")
@@ -221,9 +221,11 @@ def run_seeds(config: TrainingConfig, out: Path, count: int) -> int:
             return 1
 
 
-def _fell_under(record: dict[str, Any]) -> str:
-    """Return in words under which pushes and in which time episodes of a training fell; `record` is its run.json or
-    seeds.json."""
+def _fall_conditions(record: dict[str, Any]) -> str:
+    """Return words on the falls of a training: the pushes of its episodes and their length.
+
+    `record` is its run.json or seeds.json.
+    """
     environment = record["config"]["environment"]
     pushes = f" under pushes of ±{environment['push_newton']:g} N" if environment["push_newton"] else ""
     return f"fell{pushes} within {environment['episode_seconds']:g} s"
@@ -233,16 +235,16 @@ def _for_folders(command: str, folders: Sequence[Path]) -> str:
     """Return the advice to give `command` to the first of several folders, and then to the others, which it names."""
     first, *others = folders
     then = f", then so with {', '.join(folder.name for folder in others)}" if others else ""
-    return f"{command} {_quoted(first)}{then}"
+    return f"{command} {_quoted_path(first)}{then}"
 
 
-def _quoted(folder: Path) -> str:
-    """Return the name of a folder quoted for a shell."""
+def _quoted_path(folder: Path) -> str:
+    """Return the path of a folder, quoted for a shell."""
     return shlex.quote(str(folder))
 
 
 def configured(preset: TrainingConfig, training: dict[str, Any], environment: dict[str, Any]) -> TrainingConfig:
-    """Return the configuration of a preset, with values of the command line in place of its own.
+    """Return the configuration of a preset, with values of the command line in place of the preset's.
 
     `training` holds settings of the training, `environment` those of the environment, both by name.
     """

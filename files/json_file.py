@@ -45,13 +45,15 @@ def _read(path: Path, kind: str) -> Any:
     content = read_bytes(path, MOST_JSON_BYTES)
     require_unchanged(path, content)
     try:
-        return json.loads(content, object_pairs_hook=keys_once, parse_float=_finite, parse_constant=_finite)
+        return json.loads(
+            content, object_pairs_hook=keys_once, parse_float=_finite_number, parse_constant=_finite_number
+        )
     except (ValueError, RecursionError) as error:
         raise SpringfootError(f"{path} is no {kind}: it is not JSON, {json_fault(error)}") from None
 
 
 def keys_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """Return a JSON object's keys and values as a dictionary; raise `ValueError` for a repeated key."""
+    """Return the keys and values of a JSON object, `pairs`, as a dictionary; raise `ValueError` for a repeated key."""
     values: dict[str, Any] = {}
     for key, value in pairs:
         if key in values:
@@ -60,7 +62,7 @@ def keys_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return values
 
 
-def _finite(text: str) -> float:
+def _finite_number(text: str) -> float:
     """Return the number in a JSON text; raise `ValueError` for NaN, infinity and numbers too large for a float."""
     value = float(text)
     if not isfinite(value):

@@ -217,12 +217,12 @@ def _is_running(owner: dict[str, Any]) -> bool:
 
 
 def _taken_message(folder: Path, owner: dict[str, Any], detail: str = "") -> str:
-    """Return the message of `TakenError`, with a `detail` about the owner."""
+    """Return the message of `TakenError`: another process, the record `owner`, writes the folder; `detail` follows."""
     return f"{folder} is being written by {_owner_in_words(owner)}{detail}; wait for it, or choose another folder"
 
 
 def _owner_in_words(owner: dict[str, Any]) -> str:
-    """Return the owner in words: process, host and age."""
+    """Return words on the record `owner` of a folder: process, host, and time since it began."""
     try:
         age = (datetime.now(UTC) - datetime.fromisoformat(owner["began"])).total_seconds()
         return f"process {int(owner['pid'])} on {owner['host']}, begun {_time_in_words(age)} ago"

@@ -11,7 +11,7 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def text_of(value: float | None, pattern: str) -> str:
-    """Return a number in a table, `MISSING` for None."""
+    """Return a number as text in the format `pattern`, `MISSING` for None."""
     return MISSING if value is None else format(value, pattern)
 
 

@@ -73,7 +73,7 @@ class Table:
         )
 
     def error(self, line: int, column: str, fault: str) -> SpringfootError:
-        """Return the error that names a cell and its fault in one line."""
+        """Return the error that names the cell in `line` and `column`, and its `fault`, in one line."""
         return SpringfootError(f"{self.name}, line {line}, column {column}: {fault}")
 
     def _number(self, line: int, column: str, cell: str) -> float:
@@ -147,14 +147,14 @@ def read_csv(path: Path) -> Table:
     separator = next((mark for mark in ",;\t" if mark in names), ",")
     cells = enumerate(csv.reader(chain(head, lines), delimiter=separator, strict=True), 1)
     if separator != ",":
-        cells = ((line, [_with_point(cell) for cell in row]) for line, row in cells)
+        cells = ((line, [_with_decimal_point(cell) for cell in row]) for line, row in cells)
     try:
         return make_table(path.name, cells)
     except csv.Error as error:
         raise SpringfootError(f"{path.name} is not a CSV file: {error}") from None
 
 
-def _with_point(cell: str) -> str:
+def _with_decimal_point(cell: str) -> str:
     """Return a cell with a decimal point if it is a number with a decimal comma."""
     return cell.replace(",", ".") if _DECIMAL_COMMA.fullmatch(cell) else cell
 
@@ -184,7 +184,7 @@ def make_table(name: str, lines: Iterable[tuple[int, list[str]]]) -> Table:
     # Read line by line, so that a table too large is refused before it fills the memory.
     filled = ((line, cells) for line, cells in lines if any(cell.strip() for cell in cells))
     header, names = next(filled, (0, []))  # number and cells of the line of names; a file without lines has no names
-    columns = [_coordinate(column.strip()) for column in names]
+    columns = [_coordinate_name(column.strip()) for column in names]
     if len(columns) > MOST_COLUMNS:
         raise SpringfootError(
             f"{name}, line {header}: must have at most {MOST_COLUMNS:,} columns, has {len(columns):,}"
@@ -203,6 +203,6 @@ def make_table(name: str, lines: Iterable[tuple[int, list[str]]]) -> Table:
     return Table(name=name, columns=columns, rows=rows)
 
 
-def _coordinate(name: str) -> str:
+def _coordinate_name(name: str) -> str:
     """Shorten OpenSim's `/jointset/knee_r/knee_angle_r/value` to `knee_angle_r`."""
     return name.split("/")[-2] if name.startswith("/") and name.endswith("/value") else name

@@ -127,11 +127,11 @@ def _hidden_folder(out: Path) -> Iterator[Path]:
             if is_taken(out):
                 raise TakenError(f"{out} exists already; out must be a new folder")
             try:
-                _empty(part)
+                _empty_folder(part)
                 yield part
                 _rename_finished(part, out)
             except BaseException:
-                _empty(part)
+                _empty_folder(part)
                 raise
     finally:
         with suppress(OSError):  # it has become `out`, or it is not ours and has something in it
@@ -165,7 +165,7 @@ def _rename_finished(part: Path, out: Path) -> None:
         print(f"{out} exists by now: the results are in {name}", file=sys.stderr, flush=True)
 
 
-def _empty(folder: Path) -> None:
+def _empty_folder(folder: Path) -> None:
     """Empty a folder, except for its owner's file."""
     for path in folder.iterdir() if folder.is_dir() else ():
         if path.is_dir() and not path.is_symlink():
@@ -188,7 +188,7 @@ def csv_text(head: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
 
 
 def _cell(value: Any) -> Any:
-    """Return a value as a cell for `csv_text`."""
+    """Return a value as a cell of a CSV file: a float with six significant digits, "" if it is not finite."""
     if not isinstance(value, float):
         return value
     return f"{value:.6g}" if isfinite(value) else ""

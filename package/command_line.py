@@ -109,13 +109,15 @@ def _message_in_box(text: str) -> str:
     # As the rest of a line: a small first letter, no full stop; an ellipsis stays.
     message = message[:1].lower() + re.sub(r"(?<!\.)\.$", "", message[1:])
     _, _, similar = text.partition("Perhaps you meant:")
-    suggested = _nearest(message, re.findall(r"^[│ ] {5}(--\S+)", similar, re.MULTILINE))
+    suggested = _nearest_flags(message, re.findall(r"^[│ ] {5}(--\S+)", similar, re.MULTILINE))
     return f"{message}; perhaps {suggested}?" if suggested else message
 
 
-def _nearest(message: str, flags: Sequence[str]) -> str:
-    """Return in words those three of tyro's suggested `flags` that are most similar to the flag in the `message`, the
-    nearest first; tyro lists flags that contain it by the alphabet. "" without flags."""
+def _nearest_flags(message: str, flags: Sequence[str]) -> str:
+    """Return words that name the three of tyro's suggested `flags` nearest to the flag in the `message`, nearest first.
+
+    tyro lists them by the alphabet. "" without flags.
+    """
     wrong = next((word for word in message.split() if word.startswith("--")), "").rstrip(",")
     ordered = sorted(dict.fromkeys(flags), key=lambda flag: -SequenceMatcher(None, wrong, flag).ratio())
     *others, last = ordered[:3] or [""]

@@ -26,13 +26,13 @@ _NUMBERS: dict[str, Number] = {
 
 
 def range_of(path: str) -> tuple[float, float]:
-    """Return the lowest and the highest allowed value of a number."""
+    """Return the lowest and the highest allowed value of the number at `path`, in its unit."""
     number = _NUMBERS[path]
     return number.low, number.high
 
 
 def entry_of(foot: PlainFoot, path: str) -> Any:
-    """Return the entry of a foot at `path`; its default if the foot does not say."""
+    """Return the entry of a foot at `path`; the usual number of a kind that has it, if the foot leaves it out."""
     entries = _entries(foot)
     if path == WAY:
         return entries.get(path) or BOTH_WAYS
@@ -40,9 +40,9 @@ def entry_of(foot: PlainFoot, path: str) -> Any:
 
 
 def with_entry(foot: PlainFoot, path: str, value: Any) -> dict[str, Any]:
-    """Return a foot with another entry at `path`. Another kind keeps orthosis and segments alone.
+    """Return a copy of a foot with `value` as its entry at `path`; the copy is not checked.
 
-    The foot is unchecked.
+    If the kind changes, only the entries of the orthosis and the segments' mass ratios stay.
     """
     entries = _entries(foot)
     if path == KIND and value != entries[KIND]:
@@ -50,7 +50,7 @@ def with_entry(foot: PlainFoot, path: str, value: Any) -> dict[str, Any]:
     entries[path] = value
     if entries.get(WAY) in (None, BOTH_WAYS):
         entries.pop(WAY, None)
-    return _foot(entries)
+    return _foot_from(entries)
 
 
 def has_entry(foot: PlainFoot, path: str) -> bool:
@@ -69,14 +69,14 @@ def has_entry(foot: PlainFoot, path: str) -> bool:
 
 
 def _entries(foot: PlainFoot) -> dict[str, Any]:
-    """Return all entries of a foot by their paths."""
+    """Return path -> value of the entries that a foot states; those of an orthosis begin with `orthosis.`."""
     plain: dict[str, Any] = {KIND: foot} if isinstance(foot, str) else dict(foot)
     orthosis: dict[str, Any] = plain.pop(ORTHOSIS, None) or {}
     return plain | {f"{ORTHOSIS}.{name}": value for name, value in orthosis.items()}
 
 
-def _foot(entries: dict[str, Any]) -> dict[str, Any]:
-    """Return the foot with these entries."""
+def _foot_from(entries: dict[str, Any]) -> dict[str, Any]:
+    """Return the foot with these entries (path -> value), in plain JSON values; the inverse of `_entries`."""
     start = f"{ORTHOSIS}."
     foot = {path: value for path, value in entries.items() if not path.startswith(start)}
     orthosis = {path.removeprefix(start): value for path, value in entries.items() if path.startswith(start)}

@@ -20,7 +20,7 @@ def accept_values_only(server: viser.ViserServer) -> None:
     update = gui._handle_gui_updates
 
     async def set_value(client: Any, message: GuiUpdateMessage) -> None:
-        """Give an input the value in a message, if it accepts the message."""
+        """Set an input of the page to the value in a message; do nothing if `accepted` returns None for it."""
         handle = gui._gui_input_handle_from_uuid.get(message.uuid)
         value = accepted(handle, message.updates)
         if value is not None:

@@ -66,7 +66,8 @@ class LiveScene:
         self._begin()
 
     def show(self) -> None:
-        """Draw the body in its present posture."""
+        """Draw the body in its present posture, shifted back by the way it has walked; build the scene of a new model
+        before."""
         session = self._session
         if session.model is not self._model:
             self._server.scene.reset()
@@ -82,7 +83,7 @@ class LiveScene:
                 frame.wxyz = data.xquat[body]
             along = (-x / np.cos(slope)) % 1.0  # the grid repeats itself every metre
             self._ground.position = (along * np.cos(slope), 0.0, along * np.sin(slope))
-            self._forces.points = _arrows(session.frame.force, data.xpos[self._feet], walked)
+            self._forces.points = _force_arrows(session.frame.force, data.xpos[self._feet], walked)
 
     def _begin(self) -> None:
         """Build the scene of a new model: ground, body, arrows."""
@@ -100,7 +101,7 @@ class LiveScene:
         turn = -np.radians(self._session.wishes.slope_deg) / 2
         self._ground = scene.add_line_segments(
             "/ground",
-            _grid(),
+            _grid_lines(),
             GROUND_COLOUR,
             thickness=0.7,
             thickness_units="screen",
@@ -132,12 +133,12 @@ class LiveScene:
 
 
 def _name(body: int) -> str:
-    """Return the name in the scene of the model's body with this number."""
+    """Return the name in viser's scene of the body that has the number `body` in the model."""
     return f"/body/{body}"
 
 
-def _grid() -> NDArray:
-    """Return the lines of the ground's grid, along and across it, (K, (start, end), 3) [m]."""
+def _grid_lines() -> NDArray:
+    """Return the lines of the ground's grid, across it and along it, (line, (start, end), (x, y, z)) [m]."""
     along = GROUND_LENGTH / 2
     across = GROUND_WIDTH / 2
     xs = np.arange(-along, along + GROUND_CELL, GROUND_CELL)
@@ -146,11 +147,11 @@ def _grid() -> NDArray:
     return np.array(lines, np.float32)
 
 
-def _arrows(force: NDArray, feet: NDArray, walked: NDArray) -> NDArray:
-    """Return the arrows of the ground reaction forces, (side, (start, end), 3) [m].
+def _force_arrows(force: NDArray, feet: NDArray, walked: NDArray) -> NDArray:
+    """Return the arrows of the ground reaction forces, (side, (start, end), (x, y, z)) [m].
 
-    `force` is that of a `Frame`. Arrows stand in the planes of the `feet` (side, 3) and are shifted back by `walked`
-    (3,), as the body is. An arrow of no force has no length.
+    `force` (side, 4) is that of a `Frame`. Arrows stand in the planes of the `feet` (side, (x, y, z)) [m] and are
+    shifted back by `walked` (x, y, z) [m], as the drawn body is. An arrow of no force has no length.
     """
     points = np.zeros((len(force), 2, 3), np.float32)
     for side, (x, height, forward, up) in enumerate(force):

@@ -81,13 +81,13 @@ class Wishes:
     right_foot: PlainFoot = "intact"
 
     def named(self, name: str) -> Any:
-        """Return the wish of this name."""
+        """Return the value of the wish `name`: of a field, or of a foot's entry at the path behind the first point."""
         setting, _, path = name.partition(".")
         wish = getattr(self, setting)
         return entry_of(wish, path) if path else wish
 
     def changed(self, wishes: dict[str, Any]) -> "Wishes":
-        """Return these wishes with others of the given names, unchecked."""
+        """Return a copy with other values, `wishes` as name -> value; they are not checked."""
         new_wishes = self
         for name, wish in wishes.items():
             setting, _, path = name.partition(".")
@@ -170,7 +170,7 @@ class LiveSession:
         self.wishes = Wishes(**{name: value for name, value in (given or {}).items() if name in names})
         """Present wishes."""
         self._check(self.wishes)
-        self._biped = self._make(self.wishes)
+        self._biped = self._make_biped(self.wishes)
         self.frame: Frame
         """Numbers of the last step."""
         self.restart()
@@ -217,12 +217,12 @@ class LiveSession:
         self.wishes = new_wishes
         try:
             if changed & {*ANEW}:  # another model: the walk begins again
-                self._biped = self._make(new_wishes)
+                self._biped = self._make_biped(new_wishes)
                 self.restart()
             # Offsets of theta_eq act through new tables of rest angles, which are of one speed: a new batch that takes
             # over the state.
-            elif changed & {*OFFSETS} or (_offset(new_wishes).any() and "speed" in changed):
-                self._biped = self._make(new_wishes)
+            elif changed & {*OFFSETS} or (_rest_angle_offset(new_wishes).any() and "speed" in changed):
+                self._biped = self._make_biped(new_wishes)
                 self._biped.restore(biped.state())
                 self._walk = walked_steps(self._biped, self._action, ENDLESS)
             if "speed" in changed:
@@ -293,7 +293,7 @@ class LiveSession:
     def _force(self, tick: Tick) -> NDArray:
         """Return CoP (x, z) [m] and ground reaction force (forward, up) [body weights] of each foot, (side, 4).
 
-        Both are of the last control window; without load the CoP is 0.
+        Both are means over the control window `tick`; without load the CoP is 0.
         """
         force = tick.measurement.force[0]
         contact = tick.measurement.contact[0]
@@ -303,7 +303,8 @@ class LiveSession:
         return np.concatenate([cop, force.sum(axis=1) / (self.body.total_mass * GRAVITY)], axis=-1)
 
     def _action(self, observation: NDArray) -> NDArray:
-        """Return the action (1, A) that gives the wished K; joints with the source `policy` keep the policy's."""
+        """Return the action (1, A) that gives the wished K, clipped to [-1, 1]; a joint with the source `policy`, and
+        every action that sets no K, keeps the policy's."""
         whole = np.array(self._policy(observation), float).reshape(1, -1)
         settings = self._settings
         if settings.acts == "person":  # and sets no stiffness
@@ -327,15 +328,14 @@ class LiveSession:
             action[:, joint] = np.clip(joint_action[:, joint], -1.0, 1.0)
         return whole
 
-    def _make(self, wishes: Wishes) -> Biped:
-        """Return a batch of one body on the ground, with the load and on the feet of `wishes`, its rest angles offset
-        as wished.
+    def _make_biped(self, wishes: Wishes) -> Biped:
+        """Return a batch of one body with slope, load, feet and offsets of the rest angles as in `wishes`.
 
         Its reset decides on height, mass and speed.
         """
-        offset = _offset(wishes)
-        fixed = ("slope_deg", "carried_ratio", "left_foot", "right_foot")
-        settings = replace(self._settings, **{name: getattr(wishes, name) for name in fixed})
+        offset = _rest_angle_offset(wishes)
+        wished_settings = ("slope_deg", "carried_ratio", "left_foot", "right_foot")
+        settings = replace(self._settings, **{name: getattr(wishes, name) for name in wished_settings})
         if not offset.any():
             return Biped(settings, 1)
         # The wished body's speed at the Froude number of the settings' body, within the tabulated speeds.
@@ -346,7 +346,8 @@ class LiveSession:
         return Biped(settings, 1, rest=rest[None] + offset)  # one row, the same at all speeds
 
     def _check(self, wishes: Wishes) -> None:
-        """Raise `SpringfootError` for wishes outside their ranges."""
+        """Raise `SpringfootError` for wishes outside their ranges, and for a source of K that the policy has no actions
+        for."""
         for name, (low, high) in WISH_RANGES.items():
             require_number(name, getattr(wishes, name), low, high)
         for joint in SPRINGS:
@@ -358,6 +359,6 @@ class LiveSession:
         replace(self._settings, **{name: getattr(wishes, name) for name in ANEW})  # the settings check the rest
 
 
-def _offset(wishes: Wishes) -> NDArray:
-    """Return the wished offset of theta_eq of ankle and toe, (joint,) [rad]."""
+def _rest_angle_offset(wishes: Wishes) -> NDArray:
+    """Return the offsets of theta_eq at ankle and toe in `wishes`, (joint,) [rad]; dorsiflexion and toe-up positive."""
     return np.radians([getattr(wishes, name) for name in OFFSETS])

@@ -173,7 +173,7 @@ class LiveView:
         self._curves[client.client_id] = _add_curves(client.gui, wide=client.camera.image_width >= WIDE)
 
     def _forget(self, client: viser.ClientHandle) -> None:
-        """Send no more curves to a browser that left."""
+        """Drop the charts of a browser that left, so that no more curves are sent to it."""
         self._curves.pop(client.client_id, None)
 
     def _turn_theme(self, client: viser.ClientHandle | None) -> None:
@@ -309,7 +309,8 @@ def _set_theme(gui: viser.GuiApi, dark: bool = False) -> None:
 
 
 def _walker(policy: str, person: str) -> str:
-    """Return who walks, in Markdown: the policy, and the learned person ("" for none), who may be the policy."""
+    """Return the names of the policy and of the learned `person` ("" for none), in Markdown; one name if the policy is
+    the person."""
     names = {policy: _plain(policy)} | ({person: f"person {_plain(person)}"} if person else {})
     return ", ".join(names.values())
 

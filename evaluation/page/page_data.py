@@ -50,19 +50,19 @@ def policy_data(
             np.array([np.nan if (t := gait.metrics["toe_off_percent"]) is None else t, 100 * human.toe_off])
         ),
         "panels": [
-            *_angles(gait, human, by_leg),
-            *_kinetics(gait, human, by_leg),
-            *_com(recording, gait),
-            *_springs(recording),
-            *_reward(gait),
+            *_angle_panels(gait, human, by_leg),
+            *_force_panels(gait, human, by_leg),
+            *_com_panels(recording, gait),
+            *_spring_panels(recording),
+            *_reward_panels(gait),
         ],
-        "loops": _loops(recording, gait, human, by_leg),
+        "loops": _moment_loops(recording, gait, human, by_leg),
         "figure": figure_data(recording, words_of),
     }
 
 
 def people_words(settings: BipedSettings, human: HumanGait) -> str:
-    """Return the owner of the grey curves, and the sample of which their band is the spread."""
+    """Return the words on the page's grey curves: whose mean they are, and of which sample their band is the SD."""
     if settings.human is None:
         return f"people at {human.speed:.2f} m/s, mean ± SD over {ADULTS} adults"
     borrowed = ", of people where it has no data" if human.borrowed else ""
@@ -114,8 +114,8 @@ def _people_curve(human: HumanGait, name: str, degrees: bool = False) -> dict[st
     }
 
 
-def _angles(gait: Gait, human: HumanGait, by_leg: bool) -> list[dict[str, Any]]:
-    """Return the panels of joint angles, the legs' own curves in them if `by_leg`."""
+def _angle_panels(gait: Gait, human: HumanGait, by_leg: bool) -> list[dict[str, Any]]:
+    """Return the panels of joint angles, with a curve of each leg too if `by_leg`."""
     positive = {"ankle": "dorsiflexion", "toe": "up"}
     panels = []
     for joint, column in ANGLE_COLUMNS.items():
@@ -127,8 +127,8 @@ def _angles(gait: Gait, human: HumanGait, by_leg: bool) -> list[dict[str, Any]]:
     return panels
 
 
-def _kinetics(gait: Gait, human: HumanGait, by_leg: bool) -> list[dict[str, Any]]:
-    """Return the panels of moments, powers and ground reaction forces, the legs' own curves in them if `by_leg`."""
+def _force_panels(gait: Gait, human: HumanGait, by_leg: bool) -> list[dict[str, Any]]:
+    """Return the panels of moments, powers and ground reaction forces, with a curve of each leg too if `by_leg`."""
 
     def stride_panel(group: str, title: str, unit: str, column: str, people: dict[str, Any]) -> dict[str, Any]:
         """Return the panel of a column of the curves over the stride, with `people`'s entries."""
@@ -150,7 +150,7 @@ def _kinetics(gait: Gait, human: HumanGait, by_leg: bool) -> list[dict[str, Any]
     return panels
 
 
-def _com(recording: Recording, gait: Gait) -> list[dict[str, Any]]:
+def _com_panels(recording: Recording, gait: Gait) -> list[dict[str, Any]]:
     """Return the panels of CoM and CoP over the step, with their plan."""
     group = "Centre of mass, centre of pressure and their plans, over the step"
     axis = "step"
@@ -171,7 +171,7 @@ def _com(recording: Recording, gait: Gait) -> list[dict[str, Any]]:
     ]
 
 
-def _springs(recording: Recording) -> list[dict[str, Any]]:
+def _spring_panels(recording: Recording) -> list[dict[str, Any]]:
     """Return the panels of K and theta_eq, both legs on one pair of axes, over each leg's phase: the mean is the
     open-loop copy, the SD is feedback."""
     curves = schedule_curves(recording)
@@ -190,7 +190,7 @@ def _springs(recording: Recording) -> list[dict[str, Any]]:
     return panels
 
 
-def _reward(gait: Gait) -> list[dict[str, Any]]:
+def _reward_panels(gait: Gait) -> list[dict[str, Any]]:
     """Return the panels of the reward's terms over the step: rewards from 0 to 1, and costs."""
     group = "Reward terms over the step, unweighted"
     return [
@@ -201,7 +201,7 @@ def _reward(gait: Gait) -> list[dict[str, Any]]:
     ]
 
 
-def _loops(recording: Recording, gait: Gait, human: HumanGait, by_leg: bool) -> list[dict[str, Any]]:
+def _moment_loops(recording: Recording, gait: Gait, human: HumanGait, by_leg: bool) -> list[dict[str, Any]]:
     """Return the loops of moment [N m/kg] over angle [deg] of ankle and toe, of each leg too if `by_leg`.
 
     The ankle's has people's loop and the thesis's lines beside it.
@@ -227,8 +227,8 @@ def _loops(recording: Recording, gait: Gait, human: HumanGait, by_leg: bool) -> 
 
     def loop(joint: str) -> dict[str, Any]:
         """Return the loop of a joint in the mean of both legs, and if `by_leg` in each."""
-        of_each = {"legs": [leg_loop(foot, joint) for foot in gait.feet]} if by_leg else {}
-        return leg_loop(gait.both, joint) | of_each
+        legs = {"legs": [leg_loop(foot, joint) for foot in gait.feet]} if by_leg else {}
+        return leg_loop(gait.both, joint) | legs
 
     return [
         {

@@ -60,7 +60,7 @@ def figure_data(recording: Recording, words_of: Callable[[FootSetting], str] | N
         "strides": bool(np.isfinite(percent[0]).any()),
         "slope": slope,
         "height": body.height,
-        "feet": [_foot(foot, words_of or foot_words) for foot in (settings.left_foot, settings.right_foot)],
+        "feet": [_foot_data(foot, words_of or foot_words) for foot in (settings.left_foot, settings.right_foot)],
         "lengths": {
             "trunk": body.trunk_length,
             "thigh": body.thigh_length,
@@ -106,7 +106,7 @@ def _percent_of(strikes: NDArray, ticks: int) -> NDArray:
 def planned_zmp(recording: Recording, series: dict[str, NDArray]) -> NDArray:
     """Return the planned ZMP (T,) at the end of each tick [m forward of the world's origin].
 
-    It is that of the step of the foot whose stance began last.
+    It is that of the step of the foot whose stance began last. In the last percent of a step the value before it holds.
     """
     phase = series["phase"] % 1.0
     side = np.where(phase[:, 0] < phase[:, 1], 0, 1)  # the leg whose stride, and so stance, began last
@@ -117,16 +117,16 @@ def planned_zmp(recording: Recording, series: dict[str, NDArray]) -> NDArray:
     return series["ankle"][ticks, side, 0] + ahead
 
 
-def _foot(setting: FootSetting, words_of: Callable[[FootSetting], str]) -> dict[str, Any]:
+def _foot_data(setting: FootSetting, words_of: Callable[[FootSetting], str]) -> dict[str, Any]:
     """Return the drawing's data of a foot: its kind and numbers in words, whether it is one piece without a toe joint,
     the mechanism at ankle and toe, and whether an orthosis is on it."""
     foot = setting.foot
-    joints = [_at_joint(joint) for joint in foot.joints]
+    joints = [_mechanism_word(joint) for joint in foot.joints]
     orthosis = any(joint.orthosis is not None for joint in foot.joints)
     return {"words": words_of(setting), "one_piece": foot.one_piece, "joints": joints, "orthosis": orthosis}
 
 
-def _at_joint(joint: FootJoint) -> str:
+def _mechanism_word(joint: FootJoint) -> str:
     """Return the word for the mechanism at a joint: muscles, lock or device."""
     if joint.device is None:
         return "muscles"

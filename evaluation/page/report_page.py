@@ -64,7 +64,7 @@ def write_page(
     spoken = [spoken_verdict(gait.metrics, leg_numbers(gait.tally), words_of) for _, gait in walks]
     blocks = {
         "ORIGIN": f"{date.today():%-d %B %Y}. Grey: {escape(data['policies'][0]['people'])}.",
-        "WHO": "\n".join(_who(index, gait.metrics, spoken[index]) for index, (_, gait) in enumerate(walks)),
+        "WHO": "\n".join(_walker_line(index, gait.metrics, spoken[index]) for index, (_, gait) in enumerate(walks)),
         "VERDICT": "\n".join(_verdict(index, gait.metrics, spoken[index]) for index, (_, gait) in enumerate(walks)),
         "DATA": as_json(data),
     }
@@ -75,9 +75,13 @@ def _leg_rows(recording: Recording, gait: Gait) -> list[tuple[str, ...]]:
     """Return the rows of the table of both legs: quantity, unit, left, right, right less left, people."""
     rows = []
     for row in leg_numbers_beside_people(leg_numbers(gait.tally), recording.settings):
-        known = isinstance(row.left, float) and isinstance(row.right, float)
-        difference = row.right - row.left if known else None  # type: ignore[operator]
-        texts = (*map(row.text, (row.left, row.right)), _text(difference, f"+{row.pattern}"), row.text(row.people))
+        measured = isinstance(row.left, float) and isinstance(row.right, float)
+        difference = row.right - row.left if measured else None  # type: ignore[operator]
+        texts = (
+            *map(row.text, (row.left, row.right)),
+            _text(difference, f"+{row.pattern}"),
+            row.text(row.people),
+        )
         rows.append((row.label, row.unit, *texts))
     return rows
 
@@ -100,7 +104,7 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7
 """Colours of the policies, in their order; as in page.html."""
 
 
-def _who(index: int, metrics: dict[str, Any], spoken: Mapping[str, str]) -> str:
+def _walker_line(index: int, metrics: dict[str, Any], spoken: Mapping[str, str]) -> str:
     """Return the HTML of the line on the walker of policy number `index`: the `spoken` words on it and its falls."""
     colour = COLOURS[index % len(COLOURS)]
     words = f"{spoken['Walker']} {spoken['Falls']}"
@@ -111,7 +115,7 @@ def _who(index: int, metrics: dict[str, Any], spoken: Mapping[str, str]) -> str:
 
 
 def _verdict(index: int, metrics: dict[str, Any], spoken: Mapping[str, str]) -> str:
-    """Return the HTML of the `spoken` verdict on policy number `index`, without the words of `_who`."""
+    """Return the HTML of the `spoken` verdict on policy number `index`, without the words of `_walker_line`."""
     colour = COLOURS[index % len(COLOURS)]
     items = "".join(
         f"<dt>{escape(term)}</dt><dd>{escape(text)}</dd>"
@@ -154,7 +158,7 @@ def spoken_verdict(
     work = metrics["joint_work_J_kg"]["ankle"]
     verdict = {
         "Falls": f"{falls_text} Mean length {metrics['seconds_mean']:.1f} s.",
-        "Walker": f"{walker_words(settings, words_of)}, {environment['speed']:g} m/s, {_followed(settings)}.",
+        "Walker": f"{walker_words(settings, words_of)}, {environment['speed']:g} m/s, {_guide_words(settings)}.",
     }
     if metrics["strides"]["count"] == 0:
         return verdict | {"Gait": "No complete stride after the warm-up, so nothing of the gait could be measured."}
@@ -166,26 +170,30 @@ def spoken_verdict(
     if warning := fault(metrics):
         verdict["Warning"] = warning
     angles_judged = (
-        _judged(metrics, MOVES_LIKE_PEOPLE) if judged else f"Inside {whose}'s mean ± SD: {inside} of the stride."
+        _criteria_sentence(metrics, MOVES_LIKE_PEOPLE)
+        if judged
+        else f"Inside {whose}'s mean ± SD: {inside} of the stride."
     )
-    forces_judged = _judged(metrics, LOADS_LIKE_PEOPLE) if judged else ""
-    price = (
+    forces_judged = _criteria_sentence(metrics, LOADS_LIKE_PEOPLE) if judged else ""
+    fibre_work = (
         f"Fibre work {_text(metrics['effort']['fibre_J_kg_m'], '.2f')} J/kg/m, {whose}'s {people['fibre_J_kg_m']:.2f}."
     )
-    energy_judged = _judged(metrics, WORKS_LIKE_PEOPLE) if judged else price
+    energy_judged = _criteria_sentence(metrics, WORKS_LIKE_PEOPLE) if judged else fibre_work
     forces = f"Mean vertical force: peak, valley, peak {peaks} body weights, {whose}'s {people_peaks}."
     return verdict | {
         "Speed": f"{_text(metrics['speed_m_s']['mean'], '.2f')} m/s, asked for {environment['speed']:.2f}.",
         "Joints": f"Off {whose}'s mean by {angles} (rms). {angles_judged}",
-        "Forces": " ".join(words for words in (forces, forces_judged, _overload(legs, people, whose)) if words),
+        "Forces": " ".join(
+            words for words in (forces, forces_judged, _overload_sentence(legs, people, whose)) if words
+        ),
         "Energy": f"Cost of transport {_text(metrics['cost_of_transport'], '.3f')}; the ankle gives "
         f"{_text(work['positive'], '.2f')} J/kg a stride, {whose}'s {people['ankle_work_J_kg']['positive']:.2f}. "
         f"{energy_judged}",
     }
 
 
-def _followed(settings: BipedSettings) -> str:
-    """Return whose walk the body follows, in words."""
+def _guide_words(settings: BipedSettings) -> str:
+    """Return words on the target: the body's own plan, people's mean walk, or the walk of the setting `human`."""
     if settings.guide == "plan":
         return "after its own plan alone"
     return "after people's mean walk" if settings.human is None else "fitted to an own person"
@@ -195,8 +203,11 @@ OVERLOAD = 1.25
 """Largest vertical force over people's from which on the report says so; chosen, a quarter more."""
 
 
-def _overload(legs: Mapping[str, Mapping[str, Any]], people: Mapping[str, Any], whose: str) -> str:
-    """Return a sentence on the largest vertical force of each foot, beside that of people."""
+def _overload_sentence(legs: Mapping[str, Mapping[str, Any]], people: Mapping[str, Any], whose: str) -> str:
+    """Return a sentence that names the feet whose largest vertical force is over `OVERLOAD` times people's mean peak.
+
+    `legs` are those of `leg_numbers`, `people` the numbers of `people_metrics`, `whose` the word for these people.
+    """
     usual = max(people["grf"]["vertical_peak1_bw"], people["grf"]["vertical_peak2_bw"])
     largest = {side: leg["vertical_max_mean_bw"] for side, leg in legs.items()}
     over = {side: value for side, value in largest.items() if value is not None and value > OVERLOAD * usual}
@@ -210,7 +221,7 @@ _PEAKS = ("vertical_peak1_bw", "vertical_valley_bw", "vertical_peak2_bw")
 """Numbers of the vertical force in `grf` of metrics.json: two peaks and the valley between them."""
 
 
-def _judged(metrics: Mapping[str, Any], criteria: Sequence[Criterion]) -> str:
+def _criteria_sentence(metrics: Mapping[str, Any], criteria: Sequence[Criterion]) -> str:
     """Return a sentence that names those of `criteria` that a walk misses; `metrics` is the content of metrics.json."""
     values = with_derived(dict(metrics))
     missed = [

@@ -76,7 +76,10 @@ class Walk(NamedTuple):
 
 
 def walk_of(recording: Recording) -> Walk:
-    """Return a recorded walk with its gait."""
+    """Return a recorded walk with its gait, measured in the episodes without a fall.
+
+    The gait is None if there are none, or if a leg has no stride in them.
+    """
     upright = recording.fall_reason == ""
     gait = measure(episodes_of(recording, upright)) if upright.any() else None
     return Walk(recording, gait if gait and all(foot.count for foot in gait.feet) else None)
@@ -97,8 +100,8 @@ def walks_page(
     """
     series: list[NDArray] = []
 
-    def kept(part: tuple[dict[str, Any], NDArray] | None) -> dict[str, Any] | None:
-        """Return a stride or fall in words and numbers, its array kept among the `series`."""
+    def entry(part: tuple[dict[str, Any], NDArray] | None) -> dict[str, Any] | None:
+        """Return the page's entry of a stride or fall: its numbers, and the index of its array, added to `series`."""
         if part is None:
             return None
         series.append(part[1])
@@ -110,8 +113,8 @@ def walks_page(
             "episodes": len(walk.recording.ticks),
             "numbers": list(texts),
             "body": drawn_body(walk.recording),
-            "stride": kept(mean_stride(walk)),
-            "fall": kept(fall_of(walk)),
+            "stride": entry(mean_stride(walk)),
+            "fall": entry(fall_of(walk)),
         }
         for walk, texts in zip(walks, numbers, strict=True)
     ]
@@ -218,7 +221,10 @@ def _figure_series(recording: Recording, series: dict[str, NDArray], body: Body)
 
 def packed(series: Sequence[NDArray]) -> dict[str, Any]:
     """Return all series of a page as JSON values: `low` and `high` of each column, and 16-bit integers between them in
-    base 64."""
+    base 64.
+
+    The K of a locked joint, which is larger than any other number, becomes 0.
+    """
     values = np.stack(series)
     values = np.where(values < LOCK.stiffness, values, 0.0)  # no other number is as large as the K of a locked joint
     low = values.min(axis=(0, 1))

@@ -123,7 +123,7 @@ class _Canvas:
         return image.reduce(OVERSAMPLING)
 
     def _at(self, name: str) -> NDArray:
-        """Return the values of a series at the frame's tick."""
+        """Return the values of the series `name` at the tick of the frame that is being drawn."""
         return self._series[name][self._tick]
 
     def _pixel(self, point: NDArray) -> tuple[float, float]:
@@ -187,15 +187,16 @@ class _Canvas:
         foot = shank + angle[ANKLE]
         offsets = contact_offsets(body)
         drop = body.ankle_height - body.toe_joint_height
-        toe_joint = ankle + _turned((body.ankle_to_toe_joint, -drop), foot)
-        heel, ball = (ankle + _turned(offsets[name][:2], foot) for name in ("heel", "ball"))
-        tip = toe_joint + _turned(offsets["toe"][:2], foot + angle[TOE])
+        toe_joint = ankle + _offset_in_world((body.ankle_to_toe_joint, -drop), foot)
+        heel, ball = (ankle + _offset_in_world(offsets[name][:2], foot) for name in ("heel", "ball"))
+        tip = toe_joint + _offset_in_world(offsets["toe"][:2], foot + angle[TOE])
 
         self._capsule(hip, knee, 0.048 * size, colour)
         self._capsule(knee, ankle, 0.034 * size, colour)
         # The sole's outline runs below the spheres' centres, by their radii.
         under = [
-            ankle + _turned((forward, up - radius), foot) for forward, up, radius in (offsets["heel"], offsets["ball"])
+            ankle + _offset_in_world((forward, up - radius), foot)
+            for forward, up, radius in (offsets["heel"], offsets["ball"])
         ]
         self._draw.polygon([self._pixel(point) for point in (ankle, heel, *under, ball)], fill=colour)
         self._disc(heel, offsets["heel"][2], fill=colour)
@@ -237,15 +238,14 @@ class _Canvas:
         self._draw.polygon([self._pixel(point) for point in corners], fill=colour)
 
     def _masses(self) -> None:
-        """Draw the CoM as a ring with a dot, and the place where the plan wants it as a larger ring."""
+        """Draw the CoM as a ring with a dot, and the plan's CoM as a larger ring."""
         size = self._body.length_scale
         self._disc(self._at("com_reference"), 0.034 * size, outline=PLAN, width=round(1.8 * OVERSAMPLING))
         self._disc(self._at("com"), 0.020 * size, fill=PAPER, outline=INK, width=OVERSAMPLING)
         self._disc(self._at("com"), 0.008 * size, fill=INK)
 
     def _words(self) -> None:
-        """Write title and subtitle above the picture, and the legend below it; places in pixels of the reduced
-        frame."""
+        """Write title and subtitle above the picture, and the legend below it."""
         unit = OVERSAMPLING
         width, height = SIZE
         self._text((14 * unit, 10 * unit), self._title, 15, INK, "la")
@@ -284,7 +284,10 @@ def _palette() -> Image.Image:
     return image
 
 
-def _turned(offset: tuple[float, float], angle: float) -> NDArray:
-    """Return an offset (forward, up) in a segment's frame as one in the world; toes-up positive."""
+def _offset_in_world(offset: tuple[float, float], angle: float) -> NDArray:
+    """Return in the world, (x, z) [m], an `offset` (forward, up) [m] in the frame of a segment.
+
+    `angle` is the segment's pitch [rad], toes-up positive.
+    """
     forward, up = offset
     return np.array([forward * np.cos(angle) - up * np.sin(angle), forward * np.sin(angle) + up * np.cos(angle)])

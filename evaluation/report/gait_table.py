@@ -41,7 +41,7 @@ def print_tables(walks: Sequence[dict[str, Any]], console: Console | None = None
     """
     console = console or Console(highlight=False)
     together = _table_of_several(walks) if len(walks) > 1 and _beside_the_same_people(walks) else None
-    one_table = together is not None and _fits(together, console)
+    one_table = together is not None and _fits_uncut(together, console)
     if one_table:
         _print_head(walks, console)
         console.print(together)
@@ -51,7 +51,7 @@ def print_tables(walks: Sequence[dict[str, Any]], console: Console | None = None
     else:
         for metrics in walks:
             _print_head([metrics], console)
-            console.print(_fitting(partial(_table_of_one, metrics), console))
+            console.print(_widest_that_fits(partial(_table_of_one, metrics), console))
             console.print()
             _print_notes(metrics, console)
     if any(metrics["strides"]["count"] for metrics in walks):  # without strides there are no words to explain
@@ -59,23 +59,23 @@ def print_tables(walks: Sequence[dict[str, Any]], console: Console | None = None
             _print_line(line, console)
 
 
-def _fits(table: Table, console: Console) -> bool:
-    """Return True if a table can be printed uncut; a console that is no terminal is made as wide as it."""
-    columns = _columns(table, console)
+def _fits_uncut(table: Table, console: Console) -> bool:
+    """Return True if a table can be printed uncut; a console that is no terminal is widened to the table before."""
+    columns = _uncut_columns(table, console)
     if not console.is_terminal:
         console.width = max(console.width, columns)
     return columns <= console.width
 
 
-def _columns(table: Table, console: Console) -> int:
-    """Return how many columns a table takes uncut."""
+def _uncut_columns(table: Table, console: Console) -> int:
+    """Return the width of a table printed uncut, in characters."""
     return console.measure(table, options=console.options.update(width=ANY_WIDTH)).maximum
 
 
-def _fitting(make: Callable[[bool], Table], console: Console) -> Table:
-    """Return the table that `make` returns, the narrow one, `make(True)`, if the other would be cut."""
+def _widest_that_fits(make: Callable[[bool], Table], console: Console) -> Table:
+    """Return the wide table `make(False)`, or the narrow one, `make(True)`, if the console would cut the wide one."""
     table = make(False)
-    return table if _columns(table, console) <= console.width else make(True)
+    return table if _uncut_columns(table, console) <= console.width else make(True)
 
 
 def _print_line(text: str, console: Console, style: str = "") -> None:
@@ -84,17 +84,16 @@ def _print_line(text: str, console: Console, style: str = "") -> None:
 
 
 def _print_head(walks: Sequence[dict[str, Any]], console: Console) -> None:
-    """Print a line with the names of the policies, body, speed, rest angles, pushes and feet; one for each of these
-    worlds."""
+    """Print the names of the policies, and their world (`_world_words`): one line for the policies of equal worlds."""
     names_in = dict[str, list[str]]()
     for metrics in walks:
-        names_in.setdefault(_world(metrics), []).append(metrics["policy"])
+        names_in.setdefault(_world_words(metrics), []).append(metrics["policy"])
     console.print()
     for world, names in names_in.items():
         console.print(f"[bold]{escape(', '.join(names))}[/] on {escape(world)}", soft_wrap=not console.is_terminal)
 
 
-def _world(metrics: dict[str, Any]) -> str:
+def _world_words(metrics: dict[str, Any]) -> str:
     """Return in words the body, speed, rest angles, learned person and pushes of an evaluation; on a line below
     feet that differ."""
     environment = metrics["environment"]
@@ -111,7 +110,7 @@ def _print_notes(metrics: dict[str, Any], console: Console, of_policy: str = "")
     """Print below the table of an evaluation the table of its legs, its fault, its falls, a hint if all fell, and its
     own people, where there are any; each note begins with the words `of_policy`."""
     if metrics["per_leg"] is not None and metrics["strides"]["count"]:
-        console.print(_fitting(partial(_leg_table, metrics, heading=f"{of_policy}each leg"), console))
+        console.print(_widest_that_fits(partial(_leg_table, metrics, heading=f"{of_policy}each leg"), console))
         console.print()
     if warning := fault(metrics):
         _print_line(of_policy + warning, console, "bold red")
@@ -202,7 +201,7 @@ def _table_of_one(metrics: dict[str, Any], narrow: bool) -> Table:
     for section in _sections(metrics):
         for row in section:
             labels = [f"{row.label}, {row.unit}" if row.unit else row.label] if narrow else [row.label, row.unit]
-            if not _left_out([row.model], [metrics]):
+            if not _is_unmeasured([row.model], [metrics]):
                 table.add_row(*labels, row.model, row.people, row.r, row.inside)
         table.add_section()
     return table
@@ -218,14 +217,14 @@ def _table_of_several(walks: Sequence[dict[str, Any]]) -> Table:
         for key in dict.fromkeys(key for rows in rows_of for key in rows):
             people = next(rows[key].people for rows in rows_of if key in rows)
             cells = [rows[key].model if key in rows else "" for rows in rows_of]
-            if not _left_out(cells, walks):
+            if not _is_unmeasured(cells, walks):
                 table.add_row(*key, *cells, people)
         table.add_section()
     return table
 
 
-def _left_out(cells: Sequence[str], walks: Sequence[dict[str, Any]]) -> bool:
-    """Return True for the `cells` of a row that could not be measured in any of the `walks`, as every episode fell."""
+def _is_unmeasured(cells: Sequence[str], walks: Sequence[dict[str, Any]]) -> bool:
+    """Return True if no walk has a number among the `cells` of a row, and every episode of all `walks` fell."""
     return all(map(_all_fell, walks)) and all(set(cell) <= {MISSING, "/"} for cell in cells)
 
 
@@ -284,8 +283,8 @@ class LegRow(NamedTuple):
         return value if isinstance(value, str) else text_of(value, self.pattern)
 
 
-def _under(numbers: Any, keys: Sequence[str]) -> float | None:
-    """Return the number that lies in nested dictionaries under some keys, one after another."""
+def _number_at(numbers: Any, keys: Sequence[str]) -> float | None:
+    """Return the number in nested dictionaries to which `keys` lead, from the outermost to the innermost."""
     for key in keys:
         numbers = numbers[key]
     return numbers
@@ -297,8 +296,8 @@ def leg_numbers_beside_people(legs: Mapping[str, Mapping[str, Any]], settings: B
     human = reference_gait(settings)
 
     def row(label: str, unit: str, pattern: str, keys: Sequence[str], of_people: float | None = None) -> LegRow:
-        """Return the row of the number that lies under `keys` in a leg."""
-        left, right = (_under(leg, keys) for leg in legs.values())
+        """Return the row of the number to which `keys` lead in the numbers of each leg, and of people's number."""
+        left, right = (_number_at(leg, keys) for leg in legs.values())
         return LegRow(label, unit, pattern, left, right, of_people)
 
     rows = [

@@ -103,16 +103,18 @@ def schedule_curves(recording: Recording) -> dict[str, NDArray]:
             ("equilibrium", "equilibrium_deg", np.degrees(1.0)),
         ):
             phase, values = decisions_of(recording, [side], series)
-            mean, sd = _over_phase(phase, values * unit)
+            mean, sd = _mean_and_sd_over_phase(phase, values * unit)
             for joint, spring in enumerate(SPRINGS):
                 curves[f"{spring}_{name}_{column}"] = mean[:, joint]
                 curves[f"{spring}_{name}_{column}_sd"] = sd[:, joint]
     return dict(sorted(curves.items(), key=lambda item: "equilibrium" in item[0]))  # first all K, then all rest angles
 
 
-def _over_phase(phase: NDArray, values: NDArray) -> tuple[NDArray, NDArray]:
-    """Return mean and standard deviation over percent of the phase, (101, 2) each, of `values` (n, 2) at `phase` (n,);
-    NaN without values."""
+def _mean_and_sd_over_phase(phase: NDArray, values: NDArray) -> tuple[NDArray, NDArray]:
+    """Return mean and standard deviation over percent of the phase, (101, 2) each, of `values` (n, 2) at `phase` (n,).
+
+    The columns are ankle and toe. Both curves are linear between the knots of `mean_over_phase`; NaN without values.
+    """
     if not len(phase):
         missing = np.full((len(PERCENT), values.shape[1]), np.nan)
         return missing, missing
