@@ -40,7 +40,7 @@ def export_policy(policy: Policy, out: str | Path) -> list[Path]:
         policy: policy of this version, from `read_policy`.
         out: new file, ending in .onnx. Beside it appears its contract, OUT.json.
 
-    The graph takes the raw observation (N, D) and returns the action (N, 4) and the stiffness it sets (`Scale`) in
+    The graph takes the raw observation (N, D) and returns the action (N, A) and the stiffness it sets (`Scale`) in
     float32, the actions within 1e-5 of the policy's own. Raises `SpringfootError`, with nothing written, for another
     ending, for files that exist, and without the package onnx.
     """
@@ -192,7 +192,7 @@ OPERATORS = {"tanh": "Tanh", "relu": "Relu", "leaky_relu": "LeakyRelu", "elu": "
 
 
 def onnx_bytes(policy: Policy, scale: Scale, contract: str) -> bytes:
-    """Return the content of the ONNX file: input `observation` (N, D), outputs `action` (N, 4) and `scale.name`.
+    """Return the content of the ONNX file: input `observation` (N, D), outputs `action` (N, A) and `scale.name`.
 
     The graph computes `Policy.__call__` in float32, then `scale`. The metadata holds `contract`.
     """

@@ -55,7 +55,7 @@ def observation_rows(observation: Any, width: int) -> NDArray:
 class ForeignPolicy:
     """A policy from elsewhere, called like `Policy`: observations (N, D) or (D,) to actions in [-1, 1].
 
-    Raises `SpringfootError` for bad observations, and if it returns other values than finite actions (N, 4). Its last
+    Raises `SpringfootError` for bad observations, and if it returns other values than finite actions (N, A). Its last
     bits may differ with N.
     """
 
@@ -66,10 +66,10 @@ class ForeignPolicy:
     width: int
     """Entries D of an observation."""
     act: Callable[[NDArray], Any]
-    """Function of float32 observations (N, D) that returns actions (N, 4), which are clipped to [-1, 1]."""
+    """Function of float32 observations (N, D) that returns actions (N, A), which are clipped to [-1, 1]."""
 
     def __call__(self, observation: np.ndarray) -> np.ndarray:
-        """Return actions (N, 4) in [-1, 1] for observations (N, D)."""
+        """Return actions (N, A) in [-1, 1] for observations (N, D)."""
         rows = observation_rows(observation, self.width).astype(np.float32)
         batch = np.atleast_2d(rows)
         with _only_ordinary_errors(self.name):

@@ -70,9 +70,9 @@ class Policy:
     With a `mirror`, the layers give the actions of the left leg, and for the mirrored observation those of the right
     leg: the mirrored observation has the mirrored action, bit for bit.
 
-    Calling it maps observations (N, D), or one (D,), to actions (N, 4) or (4,), float32. The result of a row
-    does not depend on the other rows. Raises `SpringfootError` for another width or for an observation that
-    is not finite.
+    Calling it maps observations (N, D), or one (D,), to actions (N, A) or (A,), float32; A is 4, 6 or 10 by the setting
+    `acts`. The result of a row does not depend on the other rows. Raises `SpringfootError` for another width or for an
+    observation that is not finite.
     """
 
     settings: BipedSettings
@@ -132,7 +132,7 @@ class Policy:
         return np.sqrt(self.observation_variance + self.variance_floor)
 
     def __call__(self, observation: np.ndarray) -> np.ndarray:
-        """Return mean actions (N, 4) or (4,) in [-1, 1], float32, for observations (N, D) or (D,)."""
+        """Return mean actions (N, A) or (A,) in [-1, 1], float32, for observations (N, D) or (D,)."""
         rows = observation_rows(observation, len(self.observation_mean))
         if self.mirror is None:
             return self._output_of(rows)

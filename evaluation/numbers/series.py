@@ -75,7 +75,7 @@ def stride_curves(series: dict[str, NDArray], side: int, body: Body, strides: ND
     begin, _, end = strides.T
     return np.concatenate(
         [
-            on_percent(_state_curves(series, side, body), begin, end, TICK, first=TICK),
+            on_percent(_state_curves(series, side), begin, end, TICK, first=TICK),
             on_percent(_mean_curves(series, side, body), begin, end, TICK, first=TICK / 2),
         ],
         axis=-1,
@@ -87,7 +87,7 @@ def mid_tick(state: NDArray) -> NDArray:
     return np.concatenate([state[:1], 0.5 * (state[1:] + state[:-1])])
 
 
-def _state_curves(series: dict[str, NDArray], side: int, body: Body) -> NDArray:
+def _state_curves(series: dict[str, NDArray], side: int) -> NDArray:
     """Return the curves of the leg `side` that are states at the end of each of T ticks, (T, C) in the order of
     `_STATES`."""
     angle = np.degrees(series["angle"][:, side])

@@ -81,7 +81,7 @@ def _walk_batch(biped: Biped, policy: PolicyFunction, seeds: list[int]) -> list[
     fell = np.zeros(len(seeds), bool)
 
     def act(observation: NDArray) -> NDArray:
-        """Return the policy's actions (N, 4), and keep them."""
+        """Return the policy's actions (N, A), and keep them."""
         actions.append(policy(observation))
         return actions[-1]
 

@@ -193,7 +193,7 @@ def record(
     """Record `episodes` episodes of `settings.episode_seconds` each, episode i from seed `seed` + i.
 
     Args:
-        policy: deterministic function of observations (N, D) that returns actions (N, 4).
+        policy: deterministic function of observations (N, D) that returns actions (N, A).
         settings: of the environment.
         name: of the policy, in reports.
         episodes: number of episodes.
@@ -387,7 +387,7 @@ def record_walk(
 
     Args:
         biped: batch that has just been reset.
-        act: policy, a function of observations (N, D) that returns actions (N, 4).
+        act: policy, a function of observations (N, D) that returns actions (N, A).
         kept: room for episodes, which is filled.
         rows: episodes of `kept` that are walked, one for each environment.
         steps: most steps to walk; None for episodes of the settings' length.
@@ -434,7 +434,7 @@ def record_all(
     """Walk one episode for each of E `seeds`, `BATCH` of them side by side; return their series.
 
     Args:
-        policy: function of observations (N, D) that returns actions (N, 4).
+        policy: function of observations (N, D) that returns actions (N, A).
         settings: of the environment.
         seeds: (E,) seed of each episode.
         given: name -> (E,) `height`, `mass` or `speed` of each episode, where the settings draw them.

@@ -1,4 +1,4 @@
-"""Turn leg constants into a vector of unit steps, which the searches of `leg_tuning` and `person_search` move."""
+"""Turn leg constants into a vector of unit steps, which the search of `leg_tuning` moves."""
 
 from dataclasses import asdict
 
