@@ -39,6 +39,9 @@ STILL = 1e-6
 """Largest excursion of a coordinate that was not measured, [rad] or the moment's unit; chosen."""
 WEIGHT_BEARING = (15, 45)
 """Percents of the stride between which a foot bears weight; chosen. A foot without load there was not on a plate."""
+ABRUPT_UNLOADING = 0.45
+"""Fall of the vertical force within 2 % of the stride that no foot shows [body weights]; chosen: adults' mean force
+falls by 0.21 to 0.30 at 0.85 to 1.96 m/s (Bovi et al. 2011), and a foot that rolls off a plate loses all of it."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -369,9 +372,12 @@ def _body_weight(force: NDArray) -> float:
 
 def _on_plate(vertical: NDArray) -> NDArray:
     """Return (S,) True for strides whose stance was on a force plate; `vertical` (S, 101) is their vertical force."""
+    weight = _body_weight(vertical)
     low, high = WEIGHT_BEARING
     # A foot on a plate bears most of the body weight there; 0.3 of it is beyond what noise shows.
-    return vertical[:, low : high + 1].min(axis=1, initial=np.inf) > 0.3 * _body_weight(vertical)
+    bears = vertical[:, low : high + 1].min(axis=1, initial=np.inf) > 0.3 * weight
+    fall = vertical[:, low:-2] - vertical[:, low + 2 :]  # within 2 %
+    return bears & (fall.max(axis=1, initial=-np.inf) < ABRUPT_UNLOADING * weight)
 
 
 def _scaled_curves(curves: Series, side: str, unscaled: Collection[tuple[str, str]], mass: float | None) -> Series:

@@ -85,11 +85,11 @@ class Study:
                 answer = study.ask(bar.update)
             if study.quick and study.QUICK:
                 answer = replace(answer, text=f"{QUICK_NOTE}\n\n{answer.text}")
-            print(answer.text)
             made_by = f"\n\nMade by `{without_places(self.command)}`." if self.command else ""
             files = {REPORT_FILE: f"{answer.text}{made_by}\n", **answer.files}
             for file, content in files.items():
                 _write(folder / file, content)
+        print(answer.text)  # after its files: a pipe that closes early loses none of them
         print(f"\nResults: {out} ({', '.join(files)})")
         return 1 if answer.failed else 0
 

@@ -117,7 +117,9 @@ def verdict(price: str, names: Sequence[str], prices: Sequence[NDArray | None]) 
     elif first not in like_least:
         sentence += f": {difference(walked[least], walked[first]).text} against {first}"
     dearer = [f"{name} {_percent(against_least[name].mean)} %" for name in walked if name not in (*like_least, first)]
-    return f"{sentence}. Against {least}: {_list(dearer)}." if dearer else f"{sentence}."
+    sentence += f". Against {least}: {_list(dearer)}." if dearer else "."
+    unknown = [name for name in names[1:] if name not in walked]
+    return f"{sentence} Unknown, as somebody falls or is too slow: {_list(unknown)}." if unknown else sentence
 
 
 def _percent(share: float) -> str:

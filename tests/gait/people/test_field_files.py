@@ -298,6 +298,23 @@ def test_strides_off_the_force_plate_count_for_angles_alone(tmp_path):
     assert len(leg.counted("ankle_moment")) == leg.weighed.sum() == len(leg.counted("grf_vertical"))
 
 
+@pytest.mark.parametrize("end", [0.3, 0.48, 0.55])
+def test_a_plate_that_ends_under_the_foot_weighs_no_stride(end, tmp_path):
+    files = opensim("Rajagopal", tmp_path)
+    lines = files[1].read_text().splitlines()
+    whole = read_person(files).legs["left"]
+    strike, _, following = whole.times[1]
+    off = strike + end * (following - strike)
+    begin = lines.index("endheader") + 2
+    for k in range(begin, len(lines)):
+        cells = lines[k].split("\t")
+        if off <= float(cells[0]) < following - 0.05:
+            lines[k] = "\t".join([cells[0], *["0"] * (len(cells) - 1)])
+    files[1].write_text("\n".join(lines) + "\n")
+    cut = read_person(files).legs["left"]
+    assert whole.weighed.all() and not cut.weighed[1] and cut.weighed[2:].all()
+
+
 def test_the_mass_that_was_given_and_the_one_the_forces_bear(tmp_path):
     measured = read_person(opensim("Rajagopal", tmp_path), mass=90.0)
     assert measured.mass == 90.0 and any("The forces bear 7" in note and "not 90" in note for note in measured.notes)

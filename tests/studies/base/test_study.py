@@ -1,6 +1,7 @@
 """What every study does alike: its flags, its folder, its page, and the commands that stand for it."""
 
 import dataclasses
+import io
 from typing import Any, ClassVar
 
 import pytest
@@ -40,6 +41,17 @@ def test_a_study_prints_its_answer_and_writes_its_report_and_files(tmp_path, mon
     assert (tmp_path / "runs" / "counted-1" / "a" / "b.png").exists()  # beside the report, which shows it
     report = "20 episodes\n\nMade by `springfoot study counted`.\n"
     assert (tmp_path / "runs" / "counted-1" / "report.md").read_text() == report
+
+
+def test_a_pipe_that_closes_early_loses_no_folder(tmp_path, monkeypatch):
+    class Closed(io.StringIO):
+        def write(self, text):
+            raise BrokenPipeError
+
+    monkeypatch.setattr("sys.stdout", Closed())
+    with pytest.raises(BrokenPipeError):
+        Counted(out=tmp_path / "new").run("counted")
+    assert (tmp_path / "new" / "counted.csv").exists()
 
 
 def test_quick_takes_its_own_counts_and_says_that_figures_mean_nothing(tmp_path, capsys):

@@ -38,6 +38,7 @@ def test_the_verdict_names_the_least_its_like_and_the_dearer():
     assert (
         words
         == "Fibre work is least with 4, not told apart from 6: −25 % (−25 to −25) against none. Against 4: 9 +20 %."
+        " Unknown, as somebody falls or is too slow: 12."
     )
     assert (
         verdict("effort", ["none", "4"], [first, 0.99 * first]) == "Effort is least with 4, not told apart from none."
