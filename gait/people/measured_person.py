@@ -106,7 +106,7 @@ def read_person(
         if skip:
             walk = walk.without_start(skip)
             notes.append(f"Left out: the first {skip:g} s.")
-        borne = borne_mass(walk, side)
+        borne = borne_mass(walk)
         if mass is None and borne is not None:
             low, high = MASS_RANGE
             if not low <= borne <= high:

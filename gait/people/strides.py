@@ -196,7 +196,7 @@ def cut_strides(walk: MeasuredWalk, side: str = "both", mass: float | None = Non
 
 def strides_of_legs(walk: MeasuredWalk, side: str = "both", mass: float | None = None) -> dict[str, LegStrides]:
     """Cut each leg of a walk into strides; arguments and errors as of `cut_strides`."""
-    mass = borne_mass(walk, side) if mass is None else mass
+    mass = borne_mass(walk) if mass is None else mass
     legs = _legs_as_read(walk, side)
     return {
         name: replace(leg, curves=_scaled_curves(leg.curves, name, walk.unscaled, mass)) for name, leg in legs.items()
@@ -245,19 +245,22 @@ def _legs_by_weight(walk: MeasuredWalk, side: str, weight: float | None) -> dict
 
 
 def _borne_weight(legs: Iterable[LegStrides]) -> float | None:
-    """Return the weight that the vertical forces bear over whole strides, in their unit; None without forces."""
-    # Mean vertical force of each stride; percent 100 is percent 0 of the next stride.
-    borne = [leg.counted("grf_vertical")[:, :-1].mean(axis=1) for leg in legs if "grf_vertical" in leg.curves]
-    # Over a stride the two feet bear just the body's weight, and so one bears half of it.
-    return 2 * float(np.mean(np.concatenate(borne))) if sum(map(len, borne)) else None
+    """Return the weight that the vertical forces bear over whole strides, in their unit; None without forces.
 
-
-def borne_mass(walk: MeasuredWalk, side: str = "both") -> float | None:
-    """Return the mass that the vertical forces bear over whole strides [kg]; None without forces in N.
-
-    `side` is both, left or right.
+    Over a stride the two feet bear just the body's weight: one leg alone is taken to bear half of it.
     """
-    legs = _legs_as_read(walk, side)
+    # Mean vertical force over each leg's strides; percent 100 is percent 0 of the next stride.
+    borne = [
+        float(forces[:, :-1].mean())
+        for leg in legs
+        if "grf_vertical" in leg.curves and len(forces := leg.counted("grf_vertical"))
+    ]
+    return 2 * float(np.mean(borne)) if borne else None
+
+
+def borne_mass(walk: MeasuredWalk) -> float | None:
+    """Return the mass that the vertical forces of all legs bear over whole strides [kg]; None without forces in N."""
+    legs = _legs_as_read(walk, "both")
     weight = _borne_weight(leg for name, leg in legs.items() if (name, "grf_vertical") in walk.unscaled)
     return None if weight is None else weight / GRAVITY
 

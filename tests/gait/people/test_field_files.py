@@ -322,3 +322,12 @@ def test_the_mass_that_was_given_and_the_one_the_forces_bear(tmp_path):
     assert alone.mass is None and any("--mass" in note for note in alone.notes)
     weighed = read_person([tmp_path / "ik.mot", tmp_path / "id.sto"], mass=MASS)
     assert "ankle_moment" in weighed.legs["left"].curves and FORCES[0] not in weighed.legs["left"].curves
+
+
+def test_one_side_of_an_uneven_walk_is_divided_by_the_mass_that_both_feet_bear(tmp_path):
+    limping = opensim("gait2392", tmp_path, wrong={"1_ground_force_vy": 0.9, "ground_force_vy": 1.0})
+    both = read_person(limping)
+    for side in ("left", "right"):
+        assert read_person(limping, side=side).mass == both.mass
+    left, right = (both.legs[side].counted("grf_vertical")[:, :-1].mean() for side in ("left", "right"))
+    assert left + right == pytest.approx(1.0, abs=1e-12) and left < 0.95 * right
