@@ -22,7 +22,7 @@ from springfoot.command_line import exit_code
 
 from . import environments, learning
 from .timing import Case, Figures, load, machine, measure
-from .walking import STEP, batch_case, record_walk, step_over_physics
+from .walking import STEP, batch_case, record_walk, step_over_physics, step_over_plain
 
 OVERHEAD_SIZES = (64, 8, 1)
 BATCH_SIZES = (1, 8, 32, 64, 256)
@@ -93,6 +93,10 @@ def bench(effort: Effort) -> dict[str, Any]:
             sim_rate = 1e6 * STEP / full
             study_rate = 1e6 * STEP / study
 
+    of_plain = step_over_plain(walk, OVERHEAD_SIZES[0], effort.rounds)
+    for name, ratio in of_plain.items():
+        print(f"  N = {OVERHEAD_SIZES[0]}: {name.replace('_', ' ')} {ratio:.3f}")
+
     cases = [environments.batch(walk, num, threads) for num in effort.sizes for threads in THREADS]
     cases += [batch_case(walk, 64, threads) for threads in THREADS]
     cases += [environments.adapter(walk, 64, 2), environments.single(walk)]
@@ -110,6 +114,7 @@ def bench(effort: Effort) -> dict[str, Any]:
     return {
         "overhead_of_physics": dict(reversed(of_physics.items())),
         "overhead_of_study": dict(reversed(overhead.items())),
+        **of_plain,
         "start_over_walker2d": start,
         "thread_speedup_64": two / figures["springfoot, N = 64, 1 thread"].samples_per_second,
         "vs_dummy": two / _best(figures, "DummyVecEnv"),

@@ -2,6 +2,7 @@
 
 import time
 from dataclasses import dataclass
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -13,6 +14,7 @@ from springfoot.envs.batch.step_result import Tick
 from springfoot.envs.control.stiffness_control import action_of
 from springfoot.envs.physics.model import build_model
 from springfoot.envs.physics.timing import CONTROL_WINDOW, WINDOWS_PER_STEP
+from springfoot.envs.settings import BipedSettings
 from springfoot.envs.vector_env import SegmentedFootBipedVector
 from springfoot.gait.body.body import Body
 
@@ -66,9 +68,9 @@ def record_walk(num: int, steps: int) -> Walk:
     )
 
 
-def vector(num: int, threads: int = 1) -> SegmentedFootBipedVector:
+def vector(num: int, threads: int = 1, **settings: Any) -> SegmentedFootBipedVector:
     """Our batch as it is used in training: episodes that end begin anew in the same step."""
-    return SegmentedFootBipedVector(num, num_threads=threads, autoreset_mode=AutoresetMode.SAME_STEP)
+    return SegmentedFootBipedVector(num, num_threads=threads, autoreset_mode=AutoresetMode.SAME_STEP, **settings)
 
 
 def study_model() -> mujoco.MjModel:
@@ -133,6 +135,35 @@ def step_over_physics(walk: Walk, num: int, rounds: int) -> tuple[NDArray, float
         angle = env.biped.measurement.angle.reshape(num, -1)
         apart = max(apart, *(float(np.abs(data.qpos[3:] - angle[i]).max()) for i, data in enumerate(ours.bodies)))
     return spent[:, 1:].reshape(3, -1), apart
+
+
+PRICED = {"fibre_work": -1.0, "activation": -1.0, "impact": -1.0}
+"""Terms of the reward that price a walk -> a weight, which is 0 by default."""
+
+
+def step_over_plain(walk: Walk, num: int, rounds: int) -> dict[str, float]:
+    """Return the CPU time of a full step of N bodies over that of the default settings, by name of the ratio.
+
+    The steps take turns; each ratio is the median over rounds x steps.
+    """
+    weights = BipedSettings().reward_weights
+    envs = {
+        "plain": vector(num),
+        "priced_over_plain": vector(num, reward_weights={**weights, **PRICED}),
+        "learned_person_over_constants": vector(num, person="learned"),
+    }
+    clock = clock_cost()
+    spent = np.empty((len(envs), rounds + 1, len(walk.actions)))
+    for round_ in range(rounds + 1):
+        for env in envs.values():
+            env.reset(seed=SEED)
+        for step, actions in enumerate(walk.actions[:, :num]):
+            for index, env in enumerate(envs.values()):
+                begin = time.process_time()
+                env.step(actions)
+                spent[index, round_, step] = time.process_time() - begin - clock
+    ratios = np.median(spent[:, 1:] / spent[:1, 1:], axis=(1, 2))
+    return {name: float(ratio) for name, ratio in zip(envs, ratios, strict=True) if name != "plain"}
 
 
 def batch_case(walk: Walk, num: int, threads: int) -> Case:
