@@ -10,7 +10,7 @@ from springfoot.errors import SpringfootError
 
 from .batch.biped_batch import Biped
 from .batch.step_result import INFO, report_start
-from .gym_face import METADATA, Face, check_options, check_render_mode, given_walkers, spaces_of
+from .gym_face import METADATA, Face, check_options, check_render_mode, given_subjects, spaces_of
 from .physics.simulation import MjData, MjModel
 from .settings.checks import check_seed, real_numbers
 from .settings.settings import settings_from
@@ -295,12 +295,12 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
         """Start an episode; `options` may set its `start`, body, speed and feet (see Starting state)."""
         chosen = check_options(options)
         super().reset(seed=check_seed(seed))
-        self.biped.reset(np.array([0]), [self.np_random], chosen.get("start"), given_walkers(chosen, 1))
+        self.biped.reset(np.array([0]), [self.np_random], chosen.get("start"), given_subjects(chosen, 1))
         self._over = False
         if self.render_mode == "human":
             self.render()
         values = report_start(self.biped.measurement, self.biped.leg_phase, self.biped.controlled)
-        return self.biped.observe()[0], _info(values[0], np.int64(0))
+        return self.biped.observe()[0], _info(values[0], termination=np.int64(0))  # 0: none
 
     def step(self, action: NDArray) -> tuple[NDArray, float, bool, bool, dict[str, Any]]:
         """Hold what `action` (A,) sets, by default stiffness of ankles and toes, during a step, by default 20 ms."""

@@ -94,7 +94,7 @@ def check_options(options: dict[str, Any] | None, further: tuple[str, ...] = ())
     return options
 
 
-def given_walkers(options: dict[str, Any], num: int) -> dict[str, NDArray]:
+def given_subjects(options: dict[str, Any], num: int) -> dict[str, NDArray]:
     """Return name of `GIVEN` -> (N,) values of the bodies, speeds and feet that the options of a reset set; N is `num`.
 
     Names that are not among the options are left out.

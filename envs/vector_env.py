@@ -15,7 +15,7 @@ from springfoot.errors import MOST_THREADS, SpringfootError, require_count
 
 from .batch.biped_batch import Biped
 from .batch.step_result import INFO, StepResult, report_start
-from .gym_face import METADATA, Face, check_options, check_render_mode, given_walkers, spaces_of
+from .gym_face import METADATA, Face, check_options, check_render_mode, given_subjects, spaces_of
 from .settings.checks import MOST_ENVIRONMENTS, check_seed
 from .settings.feet import foot_pairs
 from .settings.settings import BipedSettings, settings_from
@@ -91,7 +91,7 @@ class SegmentedFootBipedVector(  # pyright: ignore[reportIncompatibleVariableOve
         the Env; `height`, `mass`, `speed` and `body` may also be (N,) arrays, feet a list of N.
         """
         chosen = check_options(options, ("reset_mask",))
-        given = given_walkers(chosen, self.num_envs)
+        given = given_subjects(chosen, self.num_envs)
         mask = self._reset_mask(chosen.get("reset_mask"))
         ids = np.flatnonzero(mask)
         seeds = self._seeds_of_all(seed)

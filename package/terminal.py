@@ -25,10 +25,10 @@ _SIGNALS = {signal.SIGINT: (b"interrupted", INTERRUPTED), signal.SIGTERM: (b"end
 def at_terminal(command: Callable[[], int]) -> int:
     """Run a command and return its exit code; 141 if the reader of its output left, 2 if it cannot be written.
 
-    Ctrl-C and SIGTERM end the process at once, with one line. A command that writes files handles them itself from
-    before its first writing on (`command_line.end_in_order`).
+    Ctrl-C and SIGTERM end the process at once, with one line. A command that writes files handles these signals itself
+    from before its first writing on (`command_line.end_in_order`).
     """
-    _name_glfw_library()
+    _name_glfw_library()  # else glfw would start a process to look for it, which Ctrl-C would reach too
     in_main = threading.current_thread() is threading.main_thread()
     handlers = {number: signal.signal(number, _end_at_once) for number in _SIGNALS} if in_main else {}
     try:
@@ -39,8 +39,7 @@ def at_terminal(command: Callable[[], int]) -> int:
 
 
 def _name_glfw_library() -> None:
-    """Set glfw's variable with the path of its library; to look for it, glfw would start a process, which Ctrl-C would
-    reach too."""
+    """Set glfw's variable with the path of its library, so that glfw does not look for it."""
     spec = find_spec("glfw")
     if spec is None or spec.origin is None:
         return

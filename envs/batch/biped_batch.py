@@ -173,7 +173,7 @@ class Biped(ExactState):
     def controlled(self) -> NDArray:
         """Return (N, side, 2) True where actions set the stiffness of ankle and toe; others are read as 0. A copy."""
         rows = self.subjects.rows
-        return rows["feet"]["controlled"].astype(bool) & (rows["source"]["others"] == 0)[:, None, None]
+        return rows["feet"]["controlled"].astype(bool) & (rows["source"]["not_action"] == 0)[:, None, None]
 
     @property
     def standing_mode(self) -> NDArray:

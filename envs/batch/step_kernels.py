@@ -75,7 +75,11 @@ def begin_window(rows, bodies, tables, springs, walking) -> None:
 def end_window(rows, physics, window, walking) -> None:
     """End control window number `window` of the step: measure it, advance the phase, and keep its contact forces.
 
-    `physics` is `Physics` of the simulation, as a plain tuple; the other arguments are as of `begin_step`.
+    Args:
+        rows: `EnvironmentRows`, as a plain tuple.
+        physics: `Physics` of the simulation, as a plain tuple.
+        window: number of the control window in the step, from 0.
+        walking: (N,) bool, environments whose phase moves: bodies that neither stand nor have ended.
     """
     rows = EnvironmentRows(*rows)
     physics = Physics(*physics)

@@ -80,7 +80,8 @@ def report(rows, controls, bodies, terms, options, values) -> None:
                 row.equilibrium[side, joint] = springs.equilibrium[side, joint]
                 row.work_stiffness[side, joint] = springs.work_stiffness[side, joint]
                 row.work_equilibrium[side, joint] = springs.work_equilibrium[side, joint]
-                row.controlled[side, joint] = feet.controlled[side, joint] * (1 - controls[i].source.others)
+                # No action counts where others set the stiffness.
+                row.controlled[side, joint] = feet.controlled[side, joint] * (1 - controls[i].source.not_action)
 
 
 @dataclass(kw_only=True, eq=False)

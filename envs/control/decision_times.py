@@ -51,7 +51,7 @@ def _take(actions, running, events, rows):
                 k = 2 * side + joint  # of the four actions: ankle and toe of the left leg, then of the right one
                 if keeps_action:
                     decision.action[k] = decision.last_action[k]
-                elif rows[i].source.others or not rows[i].feet.controlled[side, joint]:
+                elif rows[i].source.not_action or not rows[i].feet.controlled[side, joint]:
                     decision.action[k] = 0.0
                 else:
                     decision.action[k] = min(max(actions[i, k], -1.0), 1.0)

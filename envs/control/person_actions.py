@@ -22,7 +22,7 @@ DRAWN_SOURCES = ("scaled", "constant", "random")
 
 
 def draw_source(settings: BipedSettings, random: np.random.Generator) -> tuple[int, int, int, NDArray]:
-    """Return the fields of `STIFFNESS_SOURCE` of one episode: others, scheduled, anew, and the (4,) `drawn` numbers.
+    """Return the fields of `STIFFNESS_SOURCE` of an episode: not_action, scheduled, anew, and the (4,) `drawn` numbers.
 
     Draws nothing for the sources "action" and "schedule".
     """
@@ -90,7 +90,7 @@ class PersonActions:
         source = self._source
         for index in np.flatnonzero(running & (source["anew"] > 0)).tolist():
             source["drawn"][index] = randoms[index].uniform(-1.0, 1.0, 4)
-        others = source["others"] > 0
+        others = source["not_action"] > 0
         drawn = source["drawn"][others]
         scheduled = source["scheduled"][others, None] > 0
         factor[others] = np.where(scheduled, np.exp(drawn), ranges**drawn)

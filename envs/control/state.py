@@ -38,7 +38,7 @@ DECISION = np.dtype(
 """The actions of one environment (`envs.control.decision_times`)."""
 STIFFNESS_SOURCE = np.dtype(
     [
-        ("others", np.int64),  # 1 where others than the action set the stiffness
+        ("not_action", np.int64),  # 1 where others than the action set the stiffness
         ("scheduled", np.int64),  # then: 1 for a factor on the schedule, 0 for a stiffness within the ranges
         ("anew", np.int64),  # 1 if it is drawn anew in every step
         ("drawn", float, len(ACTIONS)),  # in place of the action, as the action mode of `scheduled` reads it

@@ -108,7 +108,7 @@ def stiffen(rows, bodies, schedule, options, factor, walking, on_schedule) -> No
                 springs.work_stiffness[side, joint] = springs.work_equilibrium[side, joint] = 0.0
                 if not walking[i]:
                     continue
-                of_source = rows[i].source.scheduled if rows[i].source.others else option.scheduled[joint]
+                of_source = rows[i].source.scheduled if rows[i].source.not_action else option.scheduled[joint]
                 base = scheduled[joint] if on_schedule[i] or of_source else option.middle[joint]
                 ratio = 1.0 if on_schedule[i] else factor[i, 2 * side + joint]
                 if not rows[i].feet.muscles[side, joint]:

@@ -1,4 +1,7 @@
-"""Write a model as MJCF text with all digits of every number, so that the loaded model steps with the same bits."""
+"""Write a model as MJCF text with all digits of every number, so that the loaded model steps with the same bits.
+
+`model` builds it.
+"""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

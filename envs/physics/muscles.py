@@ -1,9 +1,10 @@
 """Measure the work of the muscles of N bodies in each control window: moment, work and cost of their fibres.
 
-The cost, metabolic energy and squared activation, is that of `springfoot.gait.plan.effort`, compiled. A
-window of 10 ms is one of its intervals: moments are means over the physics steps, work is their sum. The moments of
-single steps are no muscle's: rest angles are held for a window, so that torques are saw teeth. A window's cost needs
-the moment of the next one too, so it is known one window later.
+The cost, metabolic energy and squared activation, is that of `springfoot.gait.plan.effort`, compiled: fibres of ankle
+and toe pull through a tendon in series, beside passive tissue (`springfoot.gait.body.tissue`). A window of 10 ms
+is one of its intervals: moments are means over the physics steps, work is their sum. The moments of single steps are no
+muscle's: rest angles are held for a window, so that torques are saw teeth. A window's cost needs the moment of the next
+one too, so it is known one window later.
 """
 
 import numpy as np

@@ -124,7 +124,7 @@ def draw_feet(entries: Sequence[DrawnFoot], random: np.random.Generator) -> Foot
 def _entries(
     name: str, value: Any, kind: type[Entry], checked: Callable[[str, Entry], Entry]
 ) -> tuple[Entry, ...] | None:
-    """Return the entries of the setting `name`, each a `kind` that `checked`, called with its label, has returned.
+    """Return the entries of the setting `name`, each made a `kind` and passed through `checked(label, entry)`.
 
     None for None. Raises `SpringfootError`, which names the entry, for a `value` of another form or a bad weight.
     """

@@ -134,7 +134,7 @@ def _impact(row, forces, i, seconds):
     """Return the term `impact` of body `i` [-]: the squared change of each foot's mean force since the last step.
 
     The sum over feet, forward and up, of (change [body weights] x `ACTIVATION_TIME` / `seconds`)^2; 0 in an episode's
-    first step.
+    first step. The time makes it a number without unit, as in the term `acceleration`.
 
     `row` is of `TASK_ROW`, `forces` (W, N, side, contact, 2) [N] in the step's windows, `seconds` the time of the step.
     """

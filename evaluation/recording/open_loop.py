@@ -65,15 +65,14 @@ def decisions_of(
     """Return the phase of the leg at each of n decisions, (n,) in [0, 1), and K of its ankle and toe from then on,
     (n, 2) [N m/rad].
 
-    A policy decides once a step. The decisions are those of all episodes and all `sides` together (0 left, 1 right; by
-    default the `deciding_legs`, or both legs if there are none), in the steady walk without its first `WARM_UP`
-    seconds. Times with slack muscles (K = 0) are left out. `series` names another recorded pair of ankle and toe, such
-    as the rest angles, to return in place of K.
+    A policy decides once in each step of the environment, of 20 ms by default. The decisions are those of all episodes
+    and all `sides` together (0 left, 1 right; by default the `deciding_legs`, or both legs if there are none), in the
+    steady walk without its first `WARM_UP` seconds. Times with slack muscles (K = 0) are left out. `series` names
+    another recorded pair of ankle and toe, such as the rest angles, to return in place of K.
     """
     begin, end = steady_walk(recording.settings)
-    step = round(recording.settings.step_seconds / TICK)  # ticks
-    # The first tick of each step but the walk's first step.
-    samples = np.arange(step, recording.series["phase"].shape[1], step)
+    ticks_a_decision = round(recording.settings.step_seconds / TICK)
+    samples = np.arange(0, recording.series["phase"].shape[1], ticks_a_decision)
     samples = samples[(samples * TICK >= begin + WARM_UP) & (samples * TICK < end)]
     if sides is None:
         sides = deciding_legs(recording.settings) or [LEFT, RIGHT]
@@ -83,7 +82,7 @@ def decisions_of(
         recording.series[name][at_decisions].reshape(-1, len(SPRINGS)).astype(float) for name in (series, "stiffness")
     )
     usable = np.isfinite(phase) & np.isfinite(values).all(-1) & (stiffness > 0.0).all(-1)
-    return phase[usable] % 1.0, values[usable]
+    return phase[usable] % 1.0, values[usable]  # float32 may round a phase up to 1
 
 
 def mean_over_phase(phase: NDArray, values: NDArray) -> NDArray:

@@ -447,7 +447,7 @@ def record_all(
         count = rows.stop - first
         batch_feet = feet and feet[rows]
         biped = Biped(settings, num_envs=count, num_threads=threads, model=model, legs=legs and [legs], feet=batch_feet)
-        biped.reset(np.arange(count), list(seeds[rows]), None, {k: v[rows] for k, v in given.items()})
+        biped.reset(np.arange(count), list(seeds[rows]), given={k: v[rows] for k, v in given.items()})
         record_walk(biped, policy, kept, rows, progress=progress)
     return kept
 

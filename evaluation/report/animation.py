@@ -185,23 +185,18 @@ class _Canvas:
         knee = hip + body.thigh_length * np.array([np.sin(thigh), -np.cos(thigh)])
         ankle = knee + body.shank_length * np.array([np.sin(shank), -np.cos(shank)])
         foot = shank + angle[ANKLE]
-        offsets = contact_offsets(body)
-        drop = body.ankle_height - body.toe_joint_height
-        toe_joint = ankle + _offset_in_world((body.ankle_to_toe_joint, -drop), foot)
-        heel, ball = (ankle + _offset_in_world(offsets[name][:2], foot) for name in ("heel", "ball"))
-        tip = toe_joint + _offset_in_world(offsets["toe"][:2], foot + angle[TOE])
+        toe = foot + angle[TOE]
+        toe_joint, (heel, ball, tip) = foot_points(body, ankle, foot, toe)
+        of_heel, of_ball, of_tip = (radius for *_, radius in contact_offsets(body).values())
 
         self._capsule(hip, knee, 0.048 * size, colour)
         self._capsule(knee, ankle, 0.034 * size, colour)
         # The sole's outline runs below the spheres' centres, by their radii.
-        under = [
-            ankle + _offset_in_world((forward, up - radius), foot)
-            for forward, up, radius in (offsets["heel"], offsets["ball"])
-        ]
+        under = heel + _offset_in_world((0.0, -of_heel), foot), ball + _offset_in_world((0.0, -of_ball), toe)
         self._draw.polygon([self._pixel(point) for point in (ankle, heel, *under, ball)], fill=colour)
-        self._disc(heel, offsets["heel"][2], fill=colour)
-        self._capsule(ankle, ball, offsets["ball"][2], colour)
-        self._capsule(ball, tip, 0.85 * offsets["toe"][2], colour)
+        self._disc(heel, of_heel, fill=colour)
+        self._capsule(ankle, ball, of_ball, colour)
+        self._capsule(ball, tip, 0.85 * of_tip, colour)
         for joint, centre, radius in ((0, ankle, 0.026), (1, toe_joint, 0.017)):  # columns of the series `stiffness`
             self._disc(
                 centre, radius * size, fill=self._stiffness_colour(side, joint), outline=PAPER, width=OVERSAMPLING
@@ -282,6 +277,22 @@ def _palette() -> Image.Image:
     image = Image.new("P", (1, 1))
     image.putpalette([*np.append(colours, [PAPER, GROUND]).astype(int).tolist()])
     return image
+
+
+def foot_points(body: Body, ankle: NDArray, foot: float, toe: float) -> tuple[NDArray, list[NDArray]]:
+    """Return where the toe joint of a foot lies, and the centres of its contact spheres in the order of `CONTACTS`, all
+    (x, z) [m].
+
+    `ankle` is (x, z) [m], `foot` and `toe` are pitches of these segments [rad], toes-up positive.
+    """
+    drop = body.ankle_height - body.toe_joint_height
+    toe_joint = ankle + _offset_in_world((body.ankle_to_toe_joint, -drop), foot)
+    frames = {"heel": (ankle, foot), "ball": (toe_joint, toe), "toe": (toe_joint, toe)}  # origin and pitch
+    spheres = [
+        frames[name][0] + _offset_in_world((forward, up), frames[name][1])
+        for name, (forward, up, _) in contact_offsets(body).items()
+    ]
+    return toe_joint, spheres
 
 
 def _offset_in_world(offset: tuple[float, float], angle: float) -> NDArray:

@@ -203,7 +203,8 @@ def inverse_dynamics(body: Body, motion: LegMotion, load: FootLoad, slope: float
     for index in reversed(range(len(LEG_SEGMENTS))):
         mass, inertia = _masses_and_inertias(body)[index]
         com, acceleration = _com(body, motion, joints, index)
-        # Newton, and Euler about the segment's CoM, less the ground's push and the loads at the joint below.
+        # Newton, and Euler about the segment's CoM, less the ground's push and the loads at the joint below. Of these
+        # `force_below` is on the segment below: its reaction, on this one, is negative.
         force_below = force
         force = mass * (acceleration - gravity(slope)) + force_below
         turning = inertia * motion.acceleration[..., index] + turning

@@ -104,7 +104,7 @@ def _read(kind: Any, words: list[str]) -> Any:
 
 
 def _read_part(kind: Any, words: list[str]) -> Any:
-    """Return the value of a type that is not a union; raise `ValueError` for other words."""
+    """Return the value of the type `kind`, no union, that `words` mean; raise `ValueError` if they mean none."""
     if get_origin(kind) is tuple:
         items = get_args(kind)
         kinds = [items[0]] * len(words) if _is_open(items) else items

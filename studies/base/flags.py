@@ -54,7 +54,10 @@ def read_own_gait(words: str, trust_units: bool = False, mass: float | None = No
 
 
 def files_of(words: str) -> tuple[list[str], str | None]:
-    """Return the file names in the value of `--human`, and the condition after its colon; None without a colon."""
+    """Return the file names in a word such as FILE, FILE,FILE or FILE:CONDITION, and the condition; None without one.
+
+    FILE:CONDITION picks one of several gaits in a CSV over percent.
+    """
     if not Path(words).is_file():
         file, _, after_colon = words.rpartition(":")
         if "," in words:

@@ -58,10 +58,14 @@ class MotionFiles(Study):
         """Return the person measured in the files, without the first `skip` seconds of the walk; None leaves out 3 s of
         a long walk (`read_person`)."""
         named = [files_of(words) for words in self.files]
-        condition = named[0][1] if len(named) == 1 else None
+        conditions = [condition for _, condition in named if condition is not None]
+        if conditions and len(named) > 1:
+            raise SpringfootError(
+                f"FILE:{conditions[0]} picks a gait of a CSV over percent, which must be alone, got {len(named)} files"
+            )
         return read_person(
             [file for files, _ in named for file in files],
-            condition=condition,
+            condition=conditions[0] if conditions else None,
             side=self.side,
             mass=self.mass,
             speed=self.speed,

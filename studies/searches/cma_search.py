@@ -76,8 +76,11 @@ def _run_generations(
     asked: Any,
     kept: list[NDArray],
 ) -> Iterator[tuple[int, list[NDArray], NDArray]]:
-    """Run and yield the generations of `generations`; the first have the costs `kept`, those of the others are computed
-    and added to `file`."""
+    """Yield number, candidates and costs of each of `count` generations.
+
+    The first have the costs `kept`; those of the others are computed by `costs_of`, added to `kept`, and written to
+    `file` together with `asked`, which says what search they are of.
+    """
     for generation in range(count):
         vectors = [np.asarray(vector) for vector in strategy.ask()]
         if generation < len(kept):

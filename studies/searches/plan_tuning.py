@@ -103,8 +103,10 @@ def style_at(vector: NDArray) -> WalkStyle:
     way = groups["zmp_way"]  # the ZMP's place after a third and two thirds of single support
     way[1] = max(way[1], way[0] + LEAST_ADVANCE)
     # A style has entries of the walk, and the others in an object `foot`.
-    of_foot = values | groups | {"zmp_travel": travel, "heel_radius": HEEL_RADIUS}
-    of_walk = {field.name: of_foot.pop(field.name) for field in fields(WalkStyle) if field.name in of_foot}
+    entries = values | groups | {"zmp_travel": travel, "heel_radius": HEEL_RADIUS}
+    names = {field.name for field in fields(WalkStyle)}
+    of_walk = {name: value for name, value in entries.items() if name in names}
+    of_foot = {name: value for name, value in entries.items() if name not in names}
     return style_from(of_walk | {"foot": of_foot})
 
 

@@ -59,14 +59,15 @@ class Landscape(PersonsStudy):
         return 2.0 * len(self.persons) * len(self._cells()) * self.episodes * self.seconds
 
     def ask(self, progress: OnProgress) -> Answer:
-        """Walk every person in every cell (ankle, toe, commanded speed); find the cheapest at equal walked speed."""
+        """Walk every person in every cell (ankle, toe, commanded speed); find at each walked speed the cells of least
+        fibre work and of least effort a metre."""
         kept = Kept(self.keep)
-        cells = {(ankle, toe): f"constant:{ankle:g},{toe:g}" for ankle, toe, _ in self._cells()}
+        policies = {(ankle, toe): f"constant:{ankle:g},{toe:g}" for ankle, toe, _ in self._cells()}
         speeds = dict.fromkeys(speed for _, _, speed in self._cells())
         numbers: dict[tuple[Any, ...], dict[str, Any]] = {}
         for person, speed in product(self.persons, speeds):
-            of_cells = self._walk(kept, person, list(cells.values()), speed, progress)
-            numbers |= {(person, *cell, speed): own for cell, own in zip(cells, of_cells, strict=True)}
+            of_cells = self._walk(kept, person, list(policies.values()), speed, progress)
+            numbers |= {(person, *cell, speed): own for cell, own in zip(policies, of_cells, strict=True)}
         walks = [
             {"person": person, **dict(zip(BOTH_STIFFNESSES, cell, strict=True)), "speed_m_s": speed}
             | numbers[person, *cell, speed]

@@ -27,8 +27,8 @@ LONGEST_PART = 0.1
 ERRORS = {"speed_error": 0.05, "com_x_error": 0.05, "com_z_error": 0.02}
 """Entry of the observation that a reflex reads -> its size at which a gain of 1 multiplies K by e; chosen: 0.15 m/s,
 4.5 cm and 1.8 cm at 1.70 m."""
-_COLUMNS = [[entry.name for entry in PERSON_OBSERVATION].index(name) for name in ERRORS]
-_UNITS = np.array(list(ERRORS.values()))
+_ERROR_COLUMNS = [[entry.name for entry in PERSON_OBSERVATION].index(name) for name in ERRORS]
+_ERROR_SIZES = np.array(list(ERRORS.values()))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,18 +62,19 @@ class StiffnessClass:
         K stays within the ranges of the settings.
         """
         ankle, toe, gains = self.split(vectors)
-        rows = np.arange(len(ankle))[:, None]
+        rows = np.arange(len(ankle))[:, None]  # (N, 1), beside indices (N, side)
         body = body_of(settings)
         centre = np.array(CENTRE) * body.stiffness_scale
 
         def act(observation: NDArray) -> NDArray:
-            """Return the actions (N, 4) at phases and errors of the observations (N, D)."""
+            """Return the actions (N, 4) for observations (N, D): K by part of the stride, the ankle's times exp(sum of
+            gain x error)."""
             phase = leg_phase(observation)  # (N, side)
             logs = np.stack(
                 [ankle[rows, _part_index(self.ankle, phase)], toe[rows, _part_index(self.toe, phase)]], axis=-1
             )
             if self.gains:
-                errors = observation[:, _COLUMNS] / _UNITS
+                errors = observation[:, _ERROR_COLUMNS] / _ERROR_SIZES
                 of_phase = gains[rows, :, _part_index(self.gains, phase)]  # (N, side, error)
                 logs[..., 0] += (of_phase * errors[:, None]).sum(-1)
             action = action_of(centre * np.exp(logs), settings, body)

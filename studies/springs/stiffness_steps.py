@@ -159,12 +159,16 @@ def paired_walks(
     steps = 0
 
     def act(observation: NDArray) -> NDArray:
-        """Return the policy's actions with the changes added; count strides and cut changes."""
+        """Return the policy's actions with the changes added.
+
+        Count strides, and for each copy of the walks the changed actions and those beyond ±1, where the environment
+        cuts them.
+        """
         phase = leg_phase(observation)
         if steps * biped.dt >= WARM_UP:
             stride[:] += phase[:, LEFT] < previous_phase[:, LEFT]
         previous_phase[:] = phase
-        record.stride = stride[:num]
+        record.stride = stride[:num]  # of the unchanged walks, the first ones; the record reads it in this step's ticks
         added = changes.added(phase, stride)
         action = policy(observation) + added
         changed[:] += (added != 0.0).reshape(copies, -1).sum(1)

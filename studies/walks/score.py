@@ -82,7 +82,7 @@ class Score(MotionFiles):
     more."""
 
     def ask(self, progress: OnProgress) -> Answer:
-        """Read the files, and hold the gait against people."""
+        """Read the files; score the gait against people, and set it beside published simulations."""
         measured = self.read(self.skip)
         human = human_gait(measured.gait.speed or USUAL_SPEED, self.height)
         curves = curves_by_side(measured)
@@ -103,10 +103,10 @@ class Score(MotionFiles):
             "People: beside RMSE the rms of their SD between adults, beside peaks their mean's. The thigh's angle is "
             "to the vertical.",
             "\n".join(f"- {line}" for line in lines),
-            beside(numbers[last], measured.gait.speed),
-            "RMSE, or r, to people. Each walk is held against its own people. All curves together are angles, moments "
-            f"and forces, in the SD that their source takes; {PUBLISHED.as_posix()} tells what each counts, where it "
-            "stands, and its licence.",
+            published_table(numbers[last], measured.gait.speed),
+            "RMSE, or r, to people; each walk is held against its own people. The columns of all curves together take "
+            f"angles, moments and forces as one, in the SD that each publication used. {PUBLISHED.as_posix()} has the "
+            "curves of each, its source and its licence.",
         ]
         return Answer(text="\n\n".join(text), files={"score.csv": scores_csv(numbers, people)})
 
@@ -176,7 +176,7 @@ def scores_csv(numbers: Mapping[str, Scores], people: Scores) -> str:
     return csv_text(["curve", "number", *numbers, "people"], rows)
 
 
-def beside(numbers: Scores, speed: float | None) -> str:
+def published_table(numbers: Scores, speed: float | None) -> str:
     """Return the Markdown table of one side's `numbers` and walking `speed` [m/s] beside published simulations."""
 
     def mean(name: str) -> float | None:

@@ -221,7 +221,7 @@ class _Run:
         """Build RLlib's PPO with the configuration's numbers, and return it; its runners start with it."""
         config = self._config
         assert self._runners is not None
-        torch.set_num_threads(1)
+        torch.set_num_threads(1)  # more compete with the threads of the physics
         register_env(_ENVIRONMENT, _runner_environments)
         steps_of_20ms = config.environment.step_seconds / ACTION_STEP  # gamma and lambda are per 20 ms
         gamma = config.gamma**steps_of_20ms

@@ -5,12 +5,14 @@ import pytest
 from drawn import has_line, kept_figures
 from PIL import Image, ImageSequence
 
+from springfoot.envs.env import SegmentedFootBiped
+from springfoot.envs.physics.model import TOE
 from springfoot.evaluation.numbers.metrics import measure
 from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.evaluation.recording.recording import record
-from springfoot.evaluation.report.animation import save_animation
+from springfoot.evaluation.report.animation import foot_points, save_animation
 from springfoot.evaluation.report.gait_figure import save_gait_figure, save_stiffness_figure
-from springfoot.gait import human_gait
+from springfoot.gait import Body, human_gait
 from springfoot.gait.people.gait_events import PERCENT
 
 
@@ -48,3 +50,19 @@ def test_the_animation_is_two_strides_below_a_megabyte(recording, tmp_path):
         frames, delay = sum(1 for _ in ImageSequence.Iterator(clip)), clip.info["duration"]
     stride = 120 / measure(recording).metrics["cadence_steps_min"]
     assert frames * delay / 1000 == pytest.approx(2 * stride, abs=0.1)
+
+
+def test_the_drawn_foot_is_that_of_the_physics():
+    env = SegmentedFootBiped()
+    env.reset(seed=0)
+    for _ in range(10):
+        env.step(np.zeros(4))
+    data = env.data
+    assert np.abs(env.biped.measurement.angle[0, :, TOE]).max() > 0.1
+    for side in ("left", "right"):
+        # The pitch of a segment is the direction of its x axis.
+        foot, toe = (np.arctan2(*data.body(f"{name}_{side}").xmat.reshape(3, 3)[[2, 0], 0]) for name in ("foot", "toe"))
+        toe_joint, spheres = foot_points(Body(), data.body(f"foot_{side}").xpos[[0, 2]], foot, toe)
+        np.testing.assert_allclose(toe_joint, data.body(f"toe_{side}").xpos[[0, 2]], atol=1e-9)
+        for name, sphere in zip(("heel", "ball", "toe"), spheres, strict=True):
+            np.testing.assert_allclose(sphere, data.geom(f"{name}_{side}").xpos[[0, 2]], atol=1e-9)
