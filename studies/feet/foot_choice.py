@@ -21,7 +21,7 @@ from matplotlib.figure import Figure
 from springfoot.agents.policies import PolicyFunction
 from springfoot.arrays import NDArray
 from springfoot.envs import BipedSettings
-from springfoot.envs.settings import FootSetting, body_of, settings_from
+from springfoot.envs.settings import FootSetting, body_of, foot_setting, settings_from
 from springfoot.errors import SpringfootError, require_number
 from springfoot.evaluation.numbers import Gait, effort_numbers, measure
 from springfoot.evaluation.page import foot_words, write_page
@@ -87,12 +87,13 @@ def _episode_prices(price: str, walks: Sequence[Sequence[_Walk]]) -> NDArray:
 def named_feet(values: Sequence[str]) -> dict[str, Any]:
     """Return name -> setting of the feet of `values` of a flag: kinds, JSON or files, named by their words or file.
 
-    Raises `SpringfootError` for two feet of one name.
+    Raises `SpringfootError` for a value that is no foot, and for two feet of one name.
     """
     named = {}
     for words in values:
         foot = read_foot_flag(words)
-        name = Path(words).stem if isfile(words) else foot_words(settings_from(left_foot=foot).left_foot)
+        checked = foot_setting("--foot", foot)
+        name = Path(words).stem if isfile(words) else foot_words(checked)
         if named.get(name, foot) != foot:
             raise SpringfootError(f"--foot: two feet are called {name!r}; give each foot once, or rename a file")
         named[name] = foot

@@ -96,3 +96,5 @@ def test_feet_have_their_words_or_the_name_of_their_file(tmp_path):
     other.write_text('{"kind": "rigid"}', encoding="utf-8")
     with pytest.raises(SpringfootError, match=r"^--foot: two feet are called 'mine'; give each foot once"):
         named_feet([str(file), str(other)])
+    with pytest.raises(SpringfootError, match=r"^--foot: ankle_stiffness must be in \[0, 3000\] N m/rad, got 5000$"):
+        named_feet(['{"kind": "passive", "ankle_stiffness": 5000}'])
