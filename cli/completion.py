@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal, Union, get_args
 import tyro
 
 Shell = Literal["bash", "zsh"]
-"""Shells that tyro writes completions for."""
+"""Shells that have completions; chosen of those that tyro writes for."""
 COMMANDS = {
     "train": "train.TrainFlags",
     "evaluate": "evaluate.EvaluateFlags",
@@ -69,7 +69,10 @@ SPECIFICATION = re.compile(r"^COMPLETION_SPEC = (\{.*\})$", re.MULTILINE)
 
 
 def _script_of_tyro(shell: str, studies: dict[str, Any]) -> str:
-    """Return tyro's completion script for a shell; `studies` as in `_all_commands`."""
+    """Return tyro's completion script for a shell, empty for one that tyro does not know.
+
+    `studies` as in `_all_commands`.
+    """
     output = io.StringIO()
     with suppress(SystemExit), redirect_stdout(output):  # tyro prints it and exits
         tyro.cli(

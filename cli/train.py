@@ -54,7 +54,8 @@ class TrainFlags:
     """Library that learns: stable-baselines3 on this machine, or RLlib on a Ray cluster (extra `rllib`), that of the
     variable RAY_ADDRESS or this machine. --resume goes on with the engine that began."""
     num_env_runners: Annotated[int | None, tyro.conf.arg(metavar="INT", help_behavior_hint="")] = None
-    """Processes of RLlib that collect, on one processor each; one for each processor but one unless given."""
+    """Processes of RLlib that collect, on one processor each; one for each processor but one unless given, or the next
+    smaller number that divides --num-envs."""
     training: tyro.conf.OmitArgPrefixes[TrainingFlags]  # type: ignore[valid-type]
     """How to train."""
     environment: tyro.conf.OmitArgPrefixes[EnvironmentFlags]  # type: ignore[valid-type]

@@ -1,4 +1,4 @@
-"""Hold the body and the commanded speed of each environment of a batch.
+"""Draw and hold the body and the commanded speed of each environment of a batch.
 
 Mechanics scale exactly (`envs.physics.model`). So curves are tabulated for one body, that of the settings, at a few
 speeds (`envs.control.reference_walk`). Each environment has the ratios of its body to that one, and a place in the

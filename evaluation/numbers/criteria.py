@@ -25,7 +25,7 @@ class Criterion:
     high: float = inf
     """Largest allowed number."""
     unit: str = ""
-    """Unit of the number, after a space."""
+    """Unit of the number, with the space before it where it has one."""
     pattern: str = ".2f"
     """Format of the number as text."""
     loosen: Literal["share", "r", ""] = ""

@@ -34,7 +34,8 @@ def print_table(metrics: dict[str, Any], console: Console | None = None) -> None
 
 
 def print_tables(walks: Sequence[dict[str, Any]], console: Console | None = None) -> None:
-    """Print evaluations as one table with a column for each, people beside them, and a legend.
+    """Print evaluations as one table with a column for each, people beside them, and a legend; one walk alone has the
+    table of its likeness.
 
     In a terminal too narrow for it, and for walks beside different people, each has a table of its own. `walks` are the
     contents of metrics.json, `console` is the place to print, standard output unless given.

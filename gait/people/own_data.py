@@ -286,7 +286,12 @@ def one_condition(table: Table, condition: str | None) -> Table:
     if len(blocks) == 1 and condition is None:
         return table
     if "condition" not in table.columns:
-        raise SpringfootError(f"{table.name} holds {len(blocks)} gaits and no column condition to tell them apart")
+        held = (
+            "one gait, without a name: give no condition"
+            if len(blocks) == 1
+            else (f"{len(blocks)} gaits and no column condition to tell them apart")
+        )
+        raise SpringfootError(f"{table.name} holds {held}")
     column = table.columns.index("condition")
     names = [cells[column] for (_, cells), *_ in blocks]  # in the first row of each gait
     if condition not in names:

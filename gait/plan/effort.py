@@ -120,7 +120,8 @@ class MuscleUse:
     activation: NDArray
     """(L, joint) integral over time of the squared activation, weighted by volume [s]."""
     rate: NDArray
-    """(L, joint) integral over time of the squared `ACTIVATION_TIME` x activation rate, weighted by volume [s]."""
+    """(L, joint) integral over time of the squared `ACTIVATION_TIME` x activation rate, weighted by volume [s]; here
+    the activation of flexors counts negative."""
 
     @property
     def energy(self) -> NDArray:

@@ -130,7 +130,8 @@ def _double_support_cops(plan: WalkPlan, step_phase: NDArray) -> tuple[NDArray, 
     heel = plan.feet.flat_heel
     tip = body.ankle_to_toe_joint + body.toe_length - plan.step_length
     at_start, at_flat, at_end = (float(plan.zmp(event)) for event in (0.0, flat, end))
-    if at_flat > heel or tip >= at_end:  # a step of about a foot's length: both centres stand still
+    if at_flat > heel or tip >= at_end:
+        # A step of about a foot's length: the rear foot bears all until foot flat, then both centres stand still.
         return np.minimum(plan.zmp(step_phase), at_flat), np.where(step_phase < flat, heel, at_end)
     rolls = 2 * (plan.feet.toe_off - plan.feet.tip_off)  # duration of the rear toe's roll, in step phases
     rear = np.interp(step_phase, [0.0, end - rolls], [at_start, tip])

@@ -32,12 +32,13 @@ from .walk_style import WalkStyle
 Cadence = Literal["people", "thesis"]
 
 PLAN_SPEED_RANGE = (0.4, 2.0)
-"""Accepted speeds [m/s]; chosen: people's data reach from 0.85 to 1.96."""
+"""Accepted speeds of the setting `speed` [m/s]; chosen: people's data reach from 0.85 to 1.96."""
 EQUAL_SPEED_RANGE = (
     PLAN_SPEED_RANGE[0] / sqrt(HEIGHT_RANGE[1] / REFERENCE_HEIGHT),
     PLAN_SPEED_RANGE[1] / sqrt(HEIGHT_RANGE[0] / REFERENCE_HEIGHT),
 )
-"""Speeds [m/s] at which a body of 1.70 m walks as the tallest and the shortest body at the ends of that range."""
+"""Speeds [m/s] of a body of 1.70 m that equal, in Froude number, the slowest of the tallest body and the fastest of the
+shortest; `plan_walk` takes these, times the square root of the body's scale."""
 SLOPE_RANGE = (radians(-5.0), radians(5.0))
 """Accepted slopes [rad], uphill positive; chosen."""
 STEP_TIME_RANGE = (0.25, 1.2)
@@ -128,13 +129,13 @@ def plan_walk(
 
     Args:
         body: lengths and masses.
-        speed: mean forward speed [m/s].
+        speed: mean forward speed [m/s], within `EQUAL_SPEED_RANGE` at 1.70 m.
         cadence: "people": step length and time as people of that height choose them at that speed (0.66 m, 0.55 s at
             1.2 m/s, 1.70 m); outside their data both change with the square root of speed. "thesis": 0.5 s a step at
             every speed (0.6 m at 1.2 m/s), times the square root of height / 1.70 m.
         step_time: [s] in place of the cadence's; the step length follows from the speed.
-        double_support: [s] in place of `DOUBLE_SUPPORT`. In a longer double support the toe rolls further over its tip,
-            and the default `zmp_travel` lies further forward.
+        double_support: [s]; by default `DOUBLE_SUPPORT` times the step time. In a longer double support the toe rolls
+            further over its tip, and the default `zmp_travel` lies further forward.
         com_height: mean [m]; by default the greatest that leaves the knees `STRAIGHTEST_KNEE`.
         com_amplitude: half of rise and fall [m]; 0 keeps the height constant, solved in closed form.
         zmp_travel: ZMP at the start and end of single support, from the stance ankle [m].
@@ -146,7 +147,7 @@ def plan_walk(
 
     At 1.2 m/s, 1.70 m the angles lie within 3.4 (thigh), 4.3 (knee) and 6.0 deg rms (ankle) of people's, and the CoM is
     accelerated by up to 0.26 g fore and aft, as double support is shorter than people's. With a double support
-    of 0.12 s the acceleration is 0.23 g, and the angles are 5.6, 7.0 and 9.3 deg off.
+    of 0.12 s, 0.22 of the step, the acceleration is 0.23 g, and the angles are 5.6, 7.0 and 9.3 deg off.
 
     Raises `SpringfootError`, saying by how much, for an impossible walk: legs too short, ZMP outside the feet, a swing
     foot in the ground.
@@ -198,7 +199,8 @@ def plan_walk(
         lowest_at=double_support * (0.5 if style is None else style.lowest),
         second=(0.0, 0.0) if style is None else style.rise_again,
     )
-    # Each search with a pivot starts from the postures of the search before, the only entry of the list.
+    # Postures of the last search, the only entry; a search with a pivot (a point `ahead` of the CoM through which the
+    # ground force passes) begins from them.
     last_legs: list[LegPostures] = []
 
     def legs_at(height: float, ahead: PPoly | None = None) -> tuple[ComMotion, LegPostures]:

@@ -313,9 +313,10 @@ class _Record:
         ends = np.stack([_phase_ends(*of_seed) for of_seed in zip(series.phase.T, series.stride.T, strict=True)], -1)
         velocity = series.velocity.reshape(len(series.velocity), -1, self._num)  # (T, copies, S)
         at_ends = velocity[ends, :, np.arange(self._num)]  # (phases, S, copies)
+        # Copy 0 is unchanged, copy 1 + len(DURATIONS) x cell + duration has that change.
         one_stride = 1 + np.arange(len(CELLS)) * len(DURATIONS)  # copy with each cell's change of one stride
         phase_index = [list(PHASES).index(name) for _, name in CELLS]
-        complete = np.isfinite(movement[0]).all((1, 2))  # seeds whose unchanged walk is finished
+        complete = np.isfinite(movement[0]).all((1, 2))  # seeds whose unchanged walk is finished, a step in each stride
         # Means over the samples, and the acceleration's integral over the phase of one leg.
         counts, sums = np.split(self._samples, [1], axis=-1)
         mean = sums / np.where(complete[:, None], counts, np.nan)

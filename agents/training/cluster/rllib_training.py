@@ -90,7 +90,7 @@ def train(config: TrainingConfig, out: str | Path, num_env_runners: int | None =
         config: as for `springfoot.agents.train`; `num_envs` and `update_steps` are those of all runners together.
         out: new folder, on this machine.
         num_env_runners: number of processes that collect, each on one processor of the cluster; 0 collects in this
-            process, None takes one for each processor but one.
+            process, None takes one for each processor but one, or the next smaller number that divides `num_envs`.
 
     The cluster is that of the variable RAY_ADDRESS, else the one this process is connected to, else this machine alone.
     Signals, status and errors are those of `springfoot.agents.train`; the bits depend on the order in which samples
@@ -201,11 +201,12 @@ class _Run:
 
     def _connect(self, stack: ExitStack) -> None:
         """Join or start a Ray cluster until `stack` is closed, and decide the number of runners."""
-        # A processor for each runner, and one for this process, which learns.
+        # A cluster of our own has a processor for each runner, and one for this process, which learns.
         stack.enter_context(joined(None if self._runners is None else max(self._runners + 1, processors())))
         available = int(ray.cluster_resources().get("CPU", 0))
         if self._runners is None:
-            self._runners = max(1, available - 1)
+            runners = range(1, max(1, available - 1) + 1)
+            self._runners = max(count for count in runners if self._config.num_envs % count == 0)
         require_count("num_env_runners", self._runners, 0)
         if self._runners > available:  # RLlib would wait for them without an end
             raise SpringfootError(
