@@ -3,7 +3,7 @@
 from springfoot.errors import SpringfootError
 
 from .body.body import GRAVITY, Body
-from .body.leg import FootLoad, LegMotion, inverse_dynamics, leg_motion, projection_moments
+from .body.leg_dynamics import FootLoad, LegMotion, inverse_dynamics, leg_motion, projection_moments
 from .people.gait_events import PERCENT
 from .people.human import HumanGait, human_gait
 from .people.own_data import OwnGait, read_gait

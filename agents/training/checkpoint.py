@@ -1,4 +1,4 @@
-"""Keep the newest few checkpoints of a run, each a whole file of a `learning_state`; a damaged one is passed over."""
+"""Keep the newest few checkpoints of a run, each a whole file of a `resume_state`; a damaged one is passed over."""
 
 import json
 import re
@@ -14,7 +14,7 @@ from springfoot.errors import SpringfootError, require_count, require_number
 from springfoot.files.tensor_file import read_tensors, write_tensors
 
 from .config import config_from_json
-from .learning_state import Learning
+from .resume_state import Learning
 from .run_record import require_past
 
 Checkpoint = tuple[dict[str, Any], dict[str, np.ndarray]]

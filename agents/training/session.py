@@ -26,9 +26,9 @@ from ..policies.policy import BEST, LAST, read_policy, save_policy
 from .callbacks import SessionAndUserCallbacks, UserCallback, call_with_evaluation
 from .checkpoint import KEPT_CHECKPOINTS, Checkpoint, checkpoints, write_checkpoint
 from .config import TrainingConfig, config_to_json, processors
-from .learning_state import learning_state, restore_learning
 from .ppo import Learner
 from .progress import Progress
+from .resume_state import restore_learning, resume_state
 from .returns import evaluation_of
 from .run_record import best_of, cut_events, event_sizes, same_source, write_record
 from .sb3_vec_env import SegmentedFootBipedVecEnv
@@ -239,7 +239,7 @@ class Session(BaseCallback):
         for form in self.logger.output_formats:
             if isinstance(form, TensorBoardOutputFormat):
                 form.writer.flush()
-        learning, arrays = learning_state(self.learner, self._environments)
+        learning, arrays = resume_state(self.learner, self._environments)
         header = {
             "timesteps": self._trained,
             "config": config_to_json(self._config),

@@ -19,8 +19,9 @@ import numpy as np
 
 from springfoot.arrays import NDArray
 
-from ..control.legs import advance, drive
+from ..control.legs import drive
 from ..control.stiffness_control import move, stiffen
+from ..control.stride_phase import advance
 from ..physics.kernel import kernel, part
 from ..physics.measurement import measure_bodies
 from ..physics.simulation import Physics

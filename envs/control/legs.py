@@ -1,7 +1,7 @@
-"""Control the phase of the gait, and the hips and knees, which no action sets.
+"""Control the hips and knees, which no action sets.
 
 Each hip and knee is a spring like the ankle (variable impedance) around the target's curves at the walking speed, with
-its moments fed forward. The stance hip also holds the trunk and the speed. A touchdown resets the phase. `legs.json`
+its moments fed forward. The stance hip also holds the trunk and the speed. `stride_phase` has the phase. `legs.json`
 holds the constants, found by searches, and the command of each. Gains are for 1.70 m and 63 kg and scale with the body
 (see `envs.physics.model`). Axes: N bodies; side, 0 left and 1 right; a `PhaseTable` (R, SAMPLES, 2, C) has R rows,
 phases, value and rise to the next phase, and C curves.
@@ -14,35 +14,27 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from springfoot.arrays import NDArray
-from springfoot.gait.body.body import GRAVITY, REFERENCE_MASS
+from springfoot.gait.body.body import GRAVITY
 
 from ..physics.kernel import kernel, part
-from ..physics.model import HIP, KNEE, LEFT, RIGHT, damping_times
+from ..physics.model import HIP, KNEE, LEFT, damping_times
 from ..physics.timing import CONTROL_WINDOW
 from .constants import KNOTS, LegConstants, SlopeConstants
 from .phase_table import GRID, PhaseTable, leg_phases, read
 from .reference_walk import ReferenceWalk
 from .state import GAINS, PLACE
+from .stride_phase import TOUCHDOWN_LOAD, speed_excess
 from .subjects import Subjects
 
 STANCE_FALL = (0.5, 0.6)
 """Stride phases over which the trunk torque of a leg falls to zero as its stance ends; chosen, about double support."""
-TOUCHDOWN_LOAD = 30.0 / (REFERENCE_MASS * GRAVITY)
-"""Vertical force of a foot that counts as touchdown [body weights]; chosen: 30 N at 63 kg, as of force plates."""
-TOUCHDOWN_PHASE = 0.80
-"""A touchdown before this stride phase of the leg is a scuff, not a step; chosen."""
-SLOWEST = -0.1
-"""Error of the speed [m/s] at which the gains' input is clipped; chosen: a body that sets off, or that its springs keep
-slow, is far slower than the plan for many steps, and its full error would make the legs trip it."""
 FARTHEST = 0.1
 """Error of the CoM's position over the stance foot [m at 1.70 m] at which the gains' input is clipped; chosen, as
-`SLOWEST`."""
+`stride_phase.SLOWEST`."""
 STANCE, HIP_STIFFNESS, KNEE_STIFFNESS, HIP_DRIVE, KNEE_DRIVE, PLANNED_SPEED, PLANNED_PLACE = range(7)
 """Columns of `leg_curves`, which explains them."""
 INCLINE_TRUNK = 3
 """Column of `slope_table` with the held trunk pitch; columns `HIP`, `KNEE` and `ANKLE` have those joints."""
-HOLD = 0.001
-"""Distance below 1 at which a leg's phase waits until its foot touches down; chosen, small against a window's 0.009."""
 
 
 def knot_curve(knots_deg: Sequence[float]) -> NDArray:
@@ -94,15 +86,6 @@ def _compute_gains(constants, rows):
 
 
 @part
-def _speed_excess(m, row):
-    """Return by how much the CoM moves forward faster than planned [m/s], at least `SLOWEST`.
-
-    `m` is of `MEASURED`, `row` of `CONTROL_ROW`.
-    """
-    return max(m.com_velocity[0] - row.subject.speed * row.legs.planned_speed, SLOWEST)
-
-
-@part
 def drive(rows, bodies, control, table, incline) -> None:
     """Begin a control window: put stiffness [N m/rad] and drive torque [N m] of hips and knees into the control.
 
@@ -126,7 +109,7 @@ def drive(rows, bodies, control, table, incline) -> None:
         for side in range(2):
             read(table, subject.place, legs.phase[side], curves[side])
         legs.planned_speed = curves[LEFT, PLANNED_SPEED]
-        too_fast = _speed_excess(m, rows[i])
+        too_fast = speed_excess(m, rows[i])
         # A stance hip holds trunk and speed by a torque; a swing hip's target shifts, so that the foot lands elsewhere.
         trunk = -gain.trunk_stiffness * (m.base[2] - gain.pitch) - gain.trunk_damping * m.base_velocity[2]
         stance_torque = trunk + gain.speed_torque * too_fast
@@ -147,43 +130,6 @@ def drive(rows, bodies, control, table, incline) -> None:
                 lean = stance * gain.trunk_stiffness * inclined[INCLINE_TRUNK]
                 control[i, side, HIP, 1] += subject.slope * (hip * inclined[HIP] + lean)
                 control[i, side, KNEE, 1] += subject.slope * knee * inclined[KNEE]
-
-
-@part
-def _load(force):
-    """Return the upward force [N] on a foot, the sum over heel, ball and toe of `force` (3, 2), forward and up [N]."""
-    return force[0, 1] + force[1, 1] + force[2, 1]
-
-
-@part
-def advance(rows, bodies, walking) -> None:
-    """Advance the phase of the legs by one window.
-
-    The phase waits at the end of a leg's stride for a late foot, and jumps to the start of its stride when a foot
-    lands. The right leg is half a stride behind the left one.
-
-    Args:
-        rows: (N,) of `CONTROL_ROW`; the phase of the legs is changed.
-        bodies: (N,) of `BODY_ROW`, as measured at the window's end.
-        walking: (N,) bool; the phase of other bodies waits.
-    """
-    for i in range(len(rows)):
-        if not walking[i]:
-            continue
-        legs = rows[i].legs
-        m = bodies[i].measured
-        gain = legs.gains
-        left = legs.phase[LEFT]
-        rate = gain.rate * (1.0 + gain.rate_gain * _speed_excess(m, rows[i]))
-        end = (0.5 if left < 0.5 else 1.0) - HOLD  # of the right leg's stride, or of the left leg's
-        left = min(left + max(rate, 0.0), max(end, left))  # never backwards, and not beyond `end`
-        right = (left + 0.5) % 1.0
-        if left > TOUCHDOWN_PHASE and _load(m.force[LEFT]) > gain.touchdown:
-            left = 0.0
-        elif right > TOUCHDOWN_PHASE and _load(m.force[RIGHT]) > gain.touchdown:
-            left = 0.5
-        legs.phase[LEFT] = left
-        legs.phase[RIGHT] = (left + 0.5) % 1.0
 
 
 class LegController:

@@ -1,4 +1,4 @@
-"""Tabulate curves over the stride once, and read them at many phases, which `legs` advances and resets."""
+"""Tabulate curves over the stride once, and read them at many phases, which `stride_phase` advances and resets."""
 
 import numpy as np
 from numpy.typing import ArrayLike

@@ -126,7 +126,8 @@ def tabulated_speeds(settings: BipedSettings) -> NDArray:
 
     With one speed to cover this is the settings' speed alone. Else (`speed_range`, `height_range`, or a start or stop,
     which go down to `SLOW_SPEED`) it is the multiples of `SPACING` that enclose all of them, and the settings' speed. A
-    multiple outside the speeds that are needed is pulled in to the nearest speed that is needed or can be planned.
+    multiple that no plan reaches (`PLAN_SPEED_RANGE`) is replaced by the end of that range, or by the outermost speed
+    that is needed, if that lies beyond.
     """
     height = settings.height
     speed = settings.speed

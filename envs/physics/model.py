@@ -15,7 +15,7 @@ import numpy as np
 
 from springfoot.arrays import NDArray
 from springfoot.gait.body.body import GRAVITY, Body
-from springfoot.gait.body.leg import JOINTS
+from springfoot.gait.body.leg_dynamics import JOINTS
 
 from .contact import CONTACTS, FRICTION, add_sphere, add_touch, contact_offsets, geom_name, ground_name
 from .foot import INTACT, SOUND, Feet, Foot, FootJoint, Spring, act_one_way, leg_segments, torque_range

@@ -99,6 +99,7 @@ class StrideTally:
 def tally_strides(recording: Recording, muscle: Muscle = AS_IS) -> StrideTally:
     """Tally every stride, step and episode of a recording: its steady walk, without the warm-up.
 
+    Whether an episode ends at rest is judged at its very end.
     `muscle` has factors on properties of the muscles whose effort is tallied.
     """
     tally = StrideTally()

@@ -9,7 +9,7 @@ from springfoot.arrays import NDArray
 from springfoot.errors import SpringfootError
 
 from ..body.body import GRAVITY, Body
-from ..body.leg import FOOT_SEGMENT, joint_positions, segment_turns
+from ..body.leg_dynamics import FOOT_SEGMENT, joint_positions, segment_turns
 from ..body.rockers import turned
 from .gait_events import CONTACT_THRESHOLD_BW, Contacts, find_contacts, on_percent
 from .human import COLUMNS, FORCES

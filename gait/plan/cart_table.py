@@ -141,10 +141,10 @@ def periodic_com(
 ) -> ComMotion:
     """Compute the only periodic CoM motion over a ZMP that repeats every step.
 
-    The ZMP p [m] runs straight between `zmp_points` at `zmp_times` [s] (first 0, last the step time T). The height
-    is z = height + bob(t) [m]. Solves x'' = (g cos a + z'') / z (x - p) - g sin a, a the `slope` [rad], with
-    x(T) = x(0) + step_length and x'(T) = x'(0): in closed form where `bob.amplitude` is 0, else with an error below
-    1e-9 m. With `ahead` [m] over time [s] (`ComMotion`) x + ahead replaces x on the right-hand side.
+    The ZMP p [m] runs straight between `zmp_points` at strictly ascending `zmp_times` [s] (first 0, last the step
+    time T). The height is z = height + bob(t) [m]. Solves x'' = (g cos a + z'') / z (x - p) - g sin a, a the `slope`
+    [rad], with x(T) = x(0) + step_length and x'(T) = x'(0): in closed form where `bob.amplitude` is 0, else with an
+    error below 1e-9 m. With `ahead` [m] over time [s] (`ComMotion`) x + ahead replaces x on the right-hand side.
     """
     if ahead is not None:
         path = _path_by_matrices(zmp_times, zmp_points, step_length, height, bob, slope, ahead)

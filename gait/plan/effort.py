@@ -20,7 +20,7 @@ import numpy as np
 from springfoot.arrays import NDArray
 
 from ..body.body import ANGLES, GRAVITY, Body
-from ..body.leg import JOINTS, inverse_dynamics
+from ..body.leg_dynamics import JOINTS, inverse_dynamics
 from ..body.tissue import ANKLE_TENDON, TOE_TENDON, passive_moments
 from ..people.human import HumanGait
 from .kinetics import planned_leg
@@ -219,9 +219,9 @@ def effort_of(plan: WalkPlan, muscle: Muscle = AS_IS) -> Effort:
 
 
 def effort_of_people(human: HumanGait, body: Body) -> Effort:
-    """Compute the effort of people's mean curves, on a body of their height.
+    """Compute the effort of people's mean curves, on a body of their height (not checked).
 
-    The toe's moment is not measured and costs nothing here.
+    The toe's moment is not measured: it is taken to be that of passive tissue, so that its muscles do nothing.
     """
     phase = np.arange(EFFORT_SAMPLES) / EFFORT_SAMPLES
     angle, rate = (np.stack([curve(name, phase) for name in ANGLES], -1) for curve in (human.mean, human.rate))

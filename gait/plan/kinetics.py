@@ -13,7 +13,7 @@ from springfoot.arrays import NDArray
 from springfoot.errors import SpringfootError
 
 from ..body.body import Body, gravity
-from ..body.leg import (
+from ..body.leg_dynamics import (
     JOINTS,
     FootLoad,
     LegMotion,

@@ -14,7 +14,7 @@ from scipy.interpolate import CubicSpline, PPoly
 from springfoot.errors import SpringfootError
 
 from ..body.body import Body, gravity
-from ..body.leg import motion_of, segment_turns, spin_rate
+from ..body.leg_dynamics import motion_of, segment_turns, spin_rate
 from ..people.fourier import PLAN_HARMONICS, fourier_jet
 from .cart_table import ComMotion
 from .posture import LOWEST_COM, POSTURE_SAMPLES, LegPostures, full_reach

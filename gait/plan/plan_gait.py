@@ -5,7 +5,7 @@ import numpy as np
 from springfoot.arrays import NDArray
 
 from ..body.body import ANGLES, GRAVITY
-from ..body.leg import JOINTS, LEG_SEGMENTS, inverse_dynamics
+from ..body.leg_dynamics import JOINTS, LEG_SEGMENTS, inverse_dynamics
 from ..people.human import HARMONICS, STANCE_TERMS, FootHabits, HumanGait
 from .kinetics import foot_force, planned_leg
 from .plan import WalkPlan

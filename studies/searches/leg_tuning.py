@@ -31,7 +31,7 @@ from .cma_search import asked_of, generations
 from .constants_file import CONSTANTS, read_constants, write_constants
 from .generic_constants import GENERIC, generic_constants
 from .leg_cost import REFINED_SECONDS, Pays, all_misses, cost
-from .leg_search import Search
+from .leg_vector import Search
 
 DIFFERENCE = 0.08
 """Step of the refinement's finite differences [units of the search]; chosen: the scatter of a walk hides a smaller

@@ -150,9 +150,10 @@ def _count_with_falls(walks: Sequence[Row], column: str) -> int:
 
 
 def cheapest(even: Sequence[Row]) -> list[dict[str, Any]]:
-    """Return the cell of the least price of each person, walked speed and price, from rows of `at_walked_speeds`.
+    """Return for each of `TWO_PRICES`, person and walked speed a row with the cheapest of the cells in `even`, rows of
+    `at_walked_speeds`.
 
-    A row has that cell's stiffness of ankle and toe, its price, and the range of each stiffness over the cells that
+    It has that cell's stiffness of ankle and toe, its price, and the range of each stiffness over the cells that
     cost at most `NOT_DEARER` more; None where no cell has a price.
     """
     rows = []
@@ -161,8 +162,8 @@ def cheapest(even: Sequence[Row]) -> list[dict[str, Any]]:
             here = [row for row in even if (row["person"], row["speed_m_s"]) == (person, speed)]
             walked = [row for row in here if row[price] is not None]
             row: dict[str, Any] = {"person": person, "speed_m_s": speed, "price": price, "cells": len(walked)}
-            ends = (f"{column}_{end}" for column in BOTH_STIFFNESSES for end in ("from", "to"))
-            row |= dict.fromkeys((*BOTH_STIFFNESSES, "least", *ends))
+            bounds = tuple(f"{column}_{end}" for column in BOTH_STIFFNESSES for end in ("from", "to"))
+            row |= dict.fromkeys((*BOTH_STIFFNESSES, "least", *bounds))
             if walked:
                 best = min(walked, key=lambda one: one[price])
                 near = [one for one in walked if one[price] <= (1.0 + NOT_DEARER) * best[price]]

@@ -328,7 +328,8 @@ class _Sheet:
         return f"**In late mid-stance the ankle's moment rises by {words} {self._unit}{beside}.**"
 
     def _table_note(self, has_rows: bool) -> str:
-        """Return the paragraph below the table; `has_rows` is True if it has a quasi-stiffness of the person."""
+        """Return the paragraph below the table; `has_rows` is True if it has rows of the person, with or without
+        a number."""
         several = any(row.slope and np.isfinite(row.slope.low) for row in self.rows)
         words = "In brackets: 95 % interval over strides"
         if not several:

@@ -221,7 +221,7 @@ STARTS = {
 
 
 @pytest.mark.parametrize(("number", "said"), [(signal.SIGINT, "interrupted"), (signal.SIGTERM, "ended by SIGTERM")])
-@pytest.mark.parametrize("imported", ["tyro", "springfoot.gait.body.leg"])
+@pytest.mark.parametrize("imported", ["tyro", "springfoot.gait.body.leg_dynamics"])
 @pytest.mark.parametrize("words", STARTS.values(), ids=STARTS)
 def test_a_signal_at_the_start_is_one_line_and_leaves_nothing(tmp_path, words, imported, number, said):
     environment = os.environ | {"PYTHONPROFILEIMPORTTIME": "1"}  # a line on standard error after each import

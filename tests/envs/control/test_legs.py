@@ -10,6 +10,7 @@ import pytest
 
 from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.control import legs as legs
+from springfoot.envs.control import stride_phase
 from springfoot.envs.control.constants import constants_at, constants_from, constants_name, leg_constants
 from springfoot.envs.control.equilibrium import PLATEAUS, REFERENCE_STIFFNESS, neutral, planned, plateau_curve
 from springfoot.envs.control.legs import knot_curve
@@ -156,7 +157,7 @@ def test_the_phase_waits_for_a_late_foot_and_starts_anew_with_it():
         phases.append(biped.step(np.array([[0.6, 0.2, 0.6, 0.2]])).info["phase/left"][0])
         landed.append(biped.measurement.force[0, :, :, 1].sum(1) > 31.0)
     step = np.diff(phases)
-    assert max(phases) <= 1.0 - legs.HOLD
+    assert max(phases) <= 1.0 - stride_phase.HOLD
     assert (step > -1e-12).sum() >= 145  # it runs forward but where a stride ends
     for index in np.flatnonzero(step < -0.5):
         assert landed[index + 1][0]  # the left foot is down where its stride begins

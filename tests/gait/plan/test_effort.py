@@ -5,7 +5,7 @@ import pytest
 
 from springfoot.gait import Body
 from springfoot.gait.body.body import GRAVITY
-from springfoot.gait.body.leg import JOINTS
+from springfoot.gait.body.leg_dynamics import JOINTS
 from springfoot.gait.body.tissue import (
     RELAXED_STIFFNESS,
     ankle_tissue_stiffness,

@@ -8,7 +8,7 @@ import pytest
 
 from springfoot.gait import GRAVITY, Body, SpringfootError, human_gait, plan_walk
 from springfoot.gait.body.body import ANGLES, gravity
-from springfoot.gait.body.leg import (
+from springfoot.gait.body.leg_dynamics import (
     FOOT_SEGMENT,
     JOINTS,
     FootLoad,

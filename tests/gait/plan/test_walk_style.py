@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from springfoot.gait import GRAVITY, Body, SpringfootError, foot_force, human_gait, plan_walk
-from springfoot.gait.body.leg import JOINTS, inverse_dynamics
+from springfoot.gait.body.leg_dynamics import JOINTS, inverse_dynamics
 from springfoot.gait.plan.foot_style import FootStyle
 from springfoot.gait.plan.kinetics import planned_leg
 from springfoot.gait.plan.walk_style import WalkStyle, least_work, styles_of

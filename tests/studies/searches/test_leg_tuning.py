@@ -18,7 +18,7 @@ from springfoot.evaluation.numbers import series as numbers_series
 from springfoot.gait.people.human import human_gait
 from springfoot.studies.searches import leg_cost
 from springfoot.studies.searches import leg_tuning as tuning
-from springfoot.studies.searches.leg_search import LEAD_STEP, LED, Search
+from springfoot.studies.searches.leg_vector import LEAD_STEP, LED, Search
 from springfoot.studies.searches.leg_walks import SECONDS
 from springfoot.studies.springs.stiffness_steps import paired_walks
 

@@ -8,7 +8,7 @@ from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.physics.model import SIDES
 from springfoot.envs.settings.settings import BipedSettings
 from springfoot.gait import GRAVITY, Body, SpringfootError
-from springfoot.gait.body.leg import (
+from springfoot.gait.body.leg_dynamics import (
     JOINTS,
     FootLoad,
     LegMotion,

@@ -53,7 +53,7 @@ class Learning(TypedDict):
     """Value and excluded formats of each unwritten number of the logger; texts and figures are not kept."""
 
 
-def learning_state(
+def resume_state(
     learner: Learner, environments: SegmentedFootBipedVecEnv
 ) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
     """Return a copy of everything that training changes: JSON values as in `Learning`, and arrays by name."""
@@ -95,7 +95,7 @@ def restore_learning(
     values: Mapping[str, Any],
     arrays: Mapping[str, np.ndarray],
 ) -> None:
-    """Bring learner and environments to the state that `learning_state` returned as `values` and `arrays`.
+    """Bring learner and environments to the state that `resume_state` returned as `values` and `arrays`.
 
     The entry `logged` is checked and left to the caller. Call it last: nothing may draw random numbers between it and
     the next rollout. Raises `SpringfootError` if the state does not fit this learner.
