@@ -39,9 +39,10 @@ STILL = 1e-6
 """Largest excursion of a coordinate that was not measured, [rad] or the moment's unit; chosen."""
 WEIGHT_BEARING = (15, 45)
 """Percents of the stride between which a foot bears weight; chosen. A foot without load there was not on a plate."""
-ABRUPT_UNLOADING = 0.45
+ABRUPT_UNLOADING = 0.7
 """Fall of the vertical force within 2 % of the stride that no foot shows [body weights]; chosen: adults' mean force
-falls by 0.21 to 0.30 at 0.85 to 1.96 m/s (Bovi et al. 2011), and a foot that rolls off a plate loses all of it."""
+falls by 0.21 to 0.30 at 0.85 to 1.96 m/s (Bovi et al. 2011), walks here on constant springs by more than 0.45, and a
+foot that rolls off a plate loses all of it."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
