@@ -28,7 +28,8 @@ MOST_TENSOR_BYTES, MOST_HEADER = 2**27, 2**24
 def write_tensors(path: Path, key: str, header: dict[str, Any], tensors: Mapping[str, np.ndarray]) -> None:
     """Write tensors and, under `key`, a JSON header, whole or not at all; equal contents give equal bytes.
 
-    Raises `SpringfootError` for a file that would be too large to read, and what `json` raises for another header.
+    Raises `SpringfootError` for a file that would be too large to read, and the errors that `json` raises for another
+    header.
     """
     json.dumps(header, allow_nan=False)  # raises for what is no JSON
     packed = {name: np.asarray(tensor, order="C") for name, tensor in tensors.items()}

@@ -179,8 +179,8 @@ PERSON_TASK = replace(
     },
 )
 """Task of a person: rest angles of hips, knees and ankles, and the stiffness where no other sets it, on drawn bodies,
-speeds and slopes. The reward pays for a held speed and for people's angles and forces, and charges what the muscles
-spend."""
+speeds and slopes. The reward pays for a held speed and for people's angles and forces, and charges the muscles'
+energy."""
 
 PRESETS: dict[str, TrainingConfig] = {
     "walk": TrainingConfig(),

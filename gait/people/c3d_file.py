@@ -88,7 +88,7 @@ def _refuse_broken(path: Path) -> None:
     """Raise `SpringfootError` for a damaged or shortened file: ezc3d would hang, crash or make up frames.
 
     Layout as in the C3D User Guide (c3d.org): blocks of 512 bytes with the header, a chain of groups and parameters,
-    and the data. The checks walk the chain as ezc3d would, and compare the file's length with what its header says.
+    and the data. The checks walk the chain as ezc3d would, and compare the file's length with that in its header.
     """
     data = read_bytes(path)
     broken = SpringfootError(f"{path.name} is not a C3D file, or it is damaged")

@@ -1,15 +1,15 @@
-"""Compute the effort of a walk: what it costs the muscles, from joint moments and angles alone.
+"""Compute the effort of a walk: its cost for the muscles, from joint moments and angles alone.
 
 The same rule holds for a plan, a step of the environment, a recording, a search and a study. The moment of a joint's
 muscle fibres is the muscles' moment less that of passive tissue. At ankle and toe the fibres pull through a tendon, a
-spring in series: what it stores they supply, what it returns is free. So the work of the fibres in a time dt is
+spring in series: they supply the energy that it stores, and its return is free. The work of fibres in a time dt is
 
     -M d(theta) + F dF / k,    F = max(M, 0) at ankle and toe,
 
 with M the fibres' moment (extension positive), theta the joint's angle (flexion positive) and k the tendon's stiffness;
-the first part is what fibres and tendon deliver to the joint.
-The work of each joint counts alone: fibres of one joint cannot use what those of another give. Effort uses no data of
-people's walks. Its terms are dimensionless, so the same weights (`PRICES`) suit every body and speed.
+the first part is the power that fibres and tendon deliver to the joint. The work of each joint counts alone: fibres of
+one joint cannot use the energy that those of another give. Effort uses no data of people's walks. Its terms are
+dimensionless, so the same weights (`PRICES`) suit every body and speed.
 """
 
 from dataclasses import dataclass

@@ -15,7 +15,7 @@ from .study import OnProgress, WalkingStudy
 
 @dataclass(frozen=True, kw_only=True)
 class ConditionWalks:
-    """How a study walks under conditions: their episodes, what is measured of them, and where that is kept."""
+    """How a study walks under conditions: their episodes, their measurements, and where that is kept."""
 
     study: WalkingStudy
     """The study, which says episodes, seeds and length."""

@@ -1,4 +1,4 @@
-"""Convert the words behind a flag to the value of a setting's type, or say what is wrong with them."""
+"""Convert the words behind a flag to the value of a setting's type, or name their fault."""
 
 from collections.abc import Callable
 from types import NoneType, UnionType

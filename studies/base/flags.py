@@ -24,7 +24,7 @@ def read_json(words: list[str], opening: str = "{") -> Any:
     """Return a dictionary, or with the `opening` bracket a list, from the first of `words`: JSON text, or the name of a
     JSON file.
 
-    Raises `ValueError`, with what is wrong, for any other word.
+    Raises `ValueError`, with the fault, for any other word.
     """
     text = words[0]
     form, read_file = {"{": ("braces", read_object), "[": ("brackets", read_array)}[opening]

@@ -1,4 +1,4 @@
-"""Give studies that read one walk's motion files their flags, the reading, and the words that tell what was read."""
+"""Give studies that read one walk's motion files their flags, the reading, and the words on it."""
 
 from collections.abc import Collection
 from dataclasses import dataclass

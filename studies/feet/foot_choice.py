@@ -335,7 +335,8 @@ _COLUMNS = {
 
 
 def _where(asked: float, speed: float, walked: Sequence[NDArray | None]) -> str:
-    """Return a sentence on the walked `speed` [m/s] of the comparison, and on who does not reach the one `asked` for.
+    """Return a sentence on the walked `speed` [m/s] of the comparison, and on the persons that do not reach the one
+    `asked` for.
 
     `walked` as of `common_speed`.
     """

@@ -79,7 +79,7 @@ def _run_generations(
     """Yield number, candidates and costs of each of `count` generations.
 
     The first have the costs `kept`; those of the others are computed by `costs_of`, added to `kept`, and written to
-    `file` together with `asked`, which says what search they are of.
+    `file` together with `asked`, which names their search.
     """
     for generation in range(count):
         vectors = [np.asarray(vector) for vector in strategy.ask()]

@@ -6,7 +6,7 @@
 A plan has people's step length and time at its speed. The search chooses everything else by the least effort of the
 plan's inverse dynamics (`springfoot.gait.plan.effort`), with the swing foot clear of the floor and joints within their
 range. It starts at round numbers. At several speeds it finds one style that changes linearly with speed: plans of least
-effort differ much at nearly the same price, so separate searches would add their luck to what changes with speed.
+effort differ much at nearly the same price, so separate searches would add their luck to the change with speed.
 """
 
 import json

@@ -268,8 +268,8 @@ def _links_table(responses: Mapping[str, Response]) -> str:
 
 
 def _note(study: Influence, responses: Mapping[str, Response]) -> str:
-    """Return the note below the tables: what their columns mean, how many walks there are, and which changes the range
-    of the actions cut short."""
+    """Return the note below the tables: the meaning of their columns, how many walks there are, and which changes the
+    range of the actions cut short."""
     cut_short = "".join(
         f" The range of the actions cuts up to {response.cut.max():.0%} of a cell's changes short in `{name}`."
         for name, response in responses.items()

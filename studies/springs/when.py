@@ -73,7 +73,7 @@ class Condition(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class When(WalkingStudy):
-    """Search constant, phased, open-loop and reflexive stiffness, each within the next, and tell what each adds."""
+    """Search constant, phased, open-loop and reflexive stiffness, each within the next, and tell the gain of each."""
 
     person: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PERSON")] = "learned"
     """Policy that moves the person, and stays as it is: a run folder, a file, or `learned`."""

@@ -1,4 +1,4 @@
-"""Hold what changes between a slower and a faster walk against what changes in people.
+"""Hold the changes from a slower to a faster walk against those of people.
 
     springfoot study changes schedule predicted learned
 
@@ -146,7 +146,7 @@ def stride_of_walk(gait: Gait) -> Stride:
 
 @dataclass(frozen=True, kw_only=True)
 class Changes(WalkingStudy):
-    """Hold what changes from a slower to a faster walk against what changes in people."""
+    """Hold the changes from a slower to a faster walk against those of people."""
 
     policies: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="POLICY ...")] = ("schedule",)
     """Policies to walk with; the plan of least effort stands beside them."""

@@ -49,7 +49,7 @@ class Experiment:
     also: Mapping[str, Callable[[Measured], bool]] = field(default_factory=dict)
     """Clause of the published tolerance beside its range -> whether it holds."""
     note: str = ""
-    """What departs from the configuration, and what is derived."""
+    """Departures from the configuration, and derived numbers."""
 
 
 # Conditions ---------------------------------------------------------------------------------------------------

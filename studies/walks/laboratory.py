@@ -25,7 +25,7 @@ LABORATORY: dict[str, Mapping[str, Any]] = {
     **{f"load of {100 * ratio:g} % on the back": given for ratio, given in LOADS.items() if ratio},
     **{f"feet of {ratio:g} times the mass": given for ratio, given in HEAVY_FEET.items() if given},
 }
-"""Condition in words -> settings; the first is what the others are compared with."""
+"""Condition in words -> settings; the others are compared with the first."""
 LABORATORY_COLUMNS = (
     Column("walked, m/s", ".2f", ("speed_m_s", "mean")),
     Column("fibre work, J/kg/m", ".2f", ("effort", "fibre_J_kg_m")),

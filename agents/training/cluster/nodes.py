@@ -66,7 +66,7 @@ def tell_of_wait(needed: int, purpose: str) -> None:
 
 @contextmanager
 def ending_waits() -> Iterator[None]:
-    """Have SIGTERM end a wait inside Ray too, which heeds only KeyboardInterrupt, and then do what it did before."""
+    """Have SIGTERM end a wait inside Ray too, which heeds only KeyboardInterrupt, and then act as before."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
