@@ -42,7 +42,7 @@ WEIGHT_BEARING = (15, 45)
 ABRUPT_UNLOADING = 0.7
 """Fall of the vertical force within 2 % of the stride that no foot shows [body weights]; chosen: adults' mean force
 falls by 0.21 to 0.30 at 0.85 to 1.96 m/s (Bovi et al. 2011), walks here on constant springs by more than 0.45, and a
-foot that rolls off a plate loses all of it."""
+foot that rolls off a plate loses all of it. Edges are missed where the force has fallen further, or is smoothed."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -197,7 +197,7 @@ class FootChoice(WalkingStudy):
             "report.html": partial(write_page, walks=shown, command=self.command, words_of=self._words_of()),
         }
         common = any(values is not None for values in prices[TWO_PRICES[0]])
-        where = _where(self.speed, speed, walked) if common else "No walked speed is common to all feet."
+        where = _where(self.speed, speed, walked) if common else "No walked speed is common to all feet: no prices."
         return Answer(text=self._text(names, rows, prices, speed, where), files=files)
 
     @property
@@ -274,28 +274,34 @@ class FootChoice(WalkingStudy):
             "change",
             *_COLUMNS,
         ]
+        are_priced = any(values is not None for values in prices[TWO_PRICES[0]])
         return "\n\n".join(
             [
-                f"**{where} {verdicts[0]}** {verdicts[1]} {WHICH_PRICE}",
+                f"**{where} {verdicts[0]}** {verdicts[1]} {WHICH_PRICE if are_priced else ''}".rstrip(),
                 table(head, lines),
-                self._how(names[0], speed),
+                self._how(names[0], speed if are_priced else None),
                 f"What this cannot say:\n\n{CANNOT_SAY}",
                 "![Price of the walk on each foot](feet.png)",
             ]
         )
 
-    def _how(self, first: str, speed: float) -> str:
-        """Return the paragraph on how the table was made: prices at a walked `speed` [m/s], changes against the foot
-        `first`."""
+    def _how(self, first: str, speed: float | None) -> str:
+        """Return the paragraph on how the table was made: prices at a walked `speed` [m/s], None if no foot has a
+        price, changes against the foot `first`."""
         calf = "" if self.calf is None else f", calves of {self.calf:.0%}"
         worn = "both feet" if self.side == "both" else f"the {self.side} foot"
         intervals = "" if len(self.persons) == 1 else ", with 95 % intervals over persons and episodes"
+        prices = (
+            ""
+            if speed is None
+            else f"Prices in this table are at {speed:.2f} m/s walked, the nearest to the asked speed that all walk; "
+            "prices.csv has them by episode, feet.csv those of the speed that each walks. "
+            f"Changes are against {first}{intervals}. "
+        )
         return (
             f"{self.height:g} m, {self.mass:g} kg{calf}, on {worn}, asked for {self.speed:g} m/s. "
             f"Persons: {', '.join(self.persons)}. Each walks on each foot {self.what_ran}, as much at "
-            f"{self._other_speed:.3g} m/s, and as much pushed by ±{self.push_newton:g} N. Prices in this table are at "
-            f"{speed:.2f} m/s walked, the nearest speed to the asked one that all walk; prices.csv has them by "
-            f"episode, feet.csv those of the speed that each walks. Changes are against {first}{intervals}. "
+            f"{self._other_speed:.3g} m/s, and as much pushed by ±{self.push_newton:g} N. {prices}"
             f"Feet less than {GAP:.0%} apart are not told apart; one that falls or does not reach the speed has no "
             "price. Push-off, of ankle and toe, is of the side that wears the foot; the largest 10 ms of force "
             "in a stride and moments are of the other side, the left one if both wear it."

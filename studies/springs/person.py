@@ -362,8 +362,8 @@ class _Sheet:
         borrowed = "" if self._toe_moment() is not None else " The toe's stiffness is the model's own."
         return (
             "`schedule.csv` and `finite_states.json` hold straight lines between events of the mean curves, both legs "
-            f"alike; swing is the model's.{borrowed} `springfoot evaluate schedule.csv {body}` walks it here, in the "
-            "folder of these results."
+            f"alike; swing is the model's.{borrowed} `springfoot evaluate schedule.csv {body}` tries it, in the "
+            "folder of these results: it may fall, as nothing but the phase decides, and both legs get one schedule."
         )
 
     def _train_words(self) -> str:
