@@ -40,9 +40,9 @@ class TrainFlags:
     resume: Annotated[Path | None, FOLDER] = None
     """Folder of a run to continue, with its saved settings, bit for bit as if nothing had interrupted it. --timesteps
     then counts further steps; --threads and --reward-weights may be changed."""
-    begin_from: Annotated[Path | None, FOLDER] = None
-    """Folder of a run whose network the training begins with, in place of an untrained one, as to adapt a person to one
-    foot; the task may be another, observations and actions not."""
+    begin_from: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER|POLICY", help_behavior_hint="")] = None
+    """Folder of a run, or a policy (`learned`, a file), whose network the training begins with, in place of an
+    untrained one, as to adapt a person to one foot; the task may be another, observations and actions not."""
     seeds: Annotated[int | None, tyro.conf.arg(metavar="INT", help_behavior_hint="")] = None
     """Train from so many seeds at once, --seed and the next ones: one process a processor, one thread each, one
     report with the spread; each in a folder seed-N of --out."""

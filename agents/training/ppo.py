@@ -5,6 +5,7 @@ PPO: proximal policy optimisation (Schulman et al. 2017, arXiv 1707.06347). The 
 """
 
 import warnings
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,10 @@ from ..policies.number_bounds import require_bounded, require_moments
 from ..policies.policy import Policy
 from .config import TrainingConfig
 from .mirrored_network import MirroredMeanStd, MirroredNetwork
+
+POLICY_SAMPLES = 1_000_000.0
+"""Samples that the statistics of a policy's observations stand for where training begins with it; its file does not
+say; chosen."""
 
 
 class Learner:
@@ -92,6 +97,29 @@ class Learner:
             )
         )
 
+    def begin_with(self, policy: Policy) -> None:
+        """Continue from the network and the observations' statistics of `policy`, with an untrained critic.
+
+        Raises `SpringfootError` if it has other layers, another activation or bounds than the actor has.
+        """
+        layers, activation, output = actor_of(self.ppo.policy)
+        shapes = [tuple(weight.shape) for weight, _ in layers]
+        own = (shapes, activation, output, self.normalized.clip_obs, self._mirror is not None)
+        given = [weight.shape for weight in policy.weights]
+        if own != (given, policy.activation, policy.output, policy.observation_clip, policy.mirror is not None):
+            raise SpringfootError(
+                f"the policy to begin from does not fit: its layers are {_widths(given, policy.mirror is not None)}, "
+                f"those of this training {_widths(shapes, self._mirror is not None)}"
+            )
+        with torch.no_grad():
+            for (weight, bias), own_weight, own_bias in zip(layers, policy.weights, policy.biases, strict=True):
+                weight.copy_(torch.from_numpy(own_weight))
+                bias.copy_(torch.from_numpy(own_bias))
+        observation = self._statistics()["observation"]
+        observation.mean = policy.observation_mean.astype(np.float64)
+        observation.var = policy.observation_variance.astype(np.float64)
+        observation.count = POLICY_SAMPLES
+
     def state(self) -> dict[str, np.ndarray]:
         """Return copies of all arrays that learning changes, by name: network, Adam's moments, running statistics."""
         tensors = {f"network.{name}": value for name, value in self.ppo.policy.state_dict().items()}
@@ -136,6 +164,12 @@ class Learner:
         """Return the running mean and variance by name, `observation` and `return`: the learner's, not copies."""
         observation: Any = self.normalized.obs_rms  # a dictionary only for dictionary observations
         return {"observation": observation, "return": self.normalized.ret_rms}
+
+
+def _widths(shapes: Sequence[tuple[int, ...]], mirrored: bool) -> str:
+    """Return the widths of the layers whose weights have these shapes, and whether they act for one leg."""
+    widths = [shapes[0][1], *(outputs for outputs, _ in shapes)]
+    return f"{' '.join(map(str, widths))}{', mirrored' if mirrored else ''}"
 
 
 def _require_shape(name: str, value: np.ndarray, shape: tuple[int, ...]) -> None:

@@ -22,7 +22,7 @@ from springfoot.files.text_table import has_content, read_bytes
 from springfoot.files.writing import write_atomically
 
 from ..policies.fingerprint import fingerprint, require_same
-from ..policies.policy import BEST, LAST, read_policy, save_policy
+from ..policies.policy import BEST, LAST, Policy, read_policy, save_policy
 from .callbacks import SessionAndUserCallbacks, UserCallback, call_with_evaluation
 from .checkpoint import KEPT_CHECKPOINTS, Checkpoint, checkpoints, write_checkpoint
 from .config import TrainingConfig, config_to_json, processors
@@ -48,7 +48,7 @@ BEST_FILE = "file.best"
 class Session(BaseCallback):
     """Train the run in the folder `out`, from the beginning or from `checkpoint`.
 
-    At the beginning the network is untrained, or that of `begin`, a checkpoint of another run.
+    At the beginning the network is untrained, or that of `begin`, a checkpoint of another run or a policy.
 
     PPO alternates rollouts, which collect steps, and updates of the weights. At the start of each rollout the exact
     state is captured; logs, evaluations and checkpoints are made of the captured state.
@@ -62,7 +62,7 @@ class Session(BaseCallback):
         checkpoint: Checkpoint | None = None,
         threads: int | None = None,
         callbacks: Sequence[UserCallback] = (),
-        begin: Checkpoint | None = None,
+        begin: Checkpoint | Policy | None = None,
     ) -> None:
         super().__init__()
         self._config = config
@@ -94,18 +94,23 @@ class Session(BaseCallback):
         self._ended: list[dict[str, Any]] = []  # infos of the episodes that ended in a rollout
         self._rollout_complete = True
 
-    def _begin_with(self, checkpoint: Checkpoint) -> dict[str, Any]:
-        """Give the learner network and running statistics of another run's checkpoint; return its entry in the record.
+    def _begin_with(self, begin: Checkpoint | Policy) -> dict[str, Any]:
+        """Give the learner network and running statistics of another run's checkpoint, or those of a policy; return
+        its entry in the record.
 
         Raises `SpringfootError` if it has other observations, actions or layers.
         """
-        header, arrays = checkpoint
+        of_policy = isinstance(begin, Policy)
+        subject, spaces = ("policy", begin.fingerprint) if of_policy else ("run", begin[0]["fingerprint"])
         same_spaces = {name: self._fingerprint[name] for name in ("observation", "action")}
-        require_same("the run to begin from", header["fingerprint"], same_spaces)
-        learned = {name: values for name, values in arrays.items() if name.startswith(LEARNED_ARRAYS)}
-        self.learner.restore(learned)
+        require_same(f"the {subject} to begin from", spaces, same_spaces)
+        if of_policy:
+            self.learner.begin_with(begin)
+        else:
+            self.learner.restore(_learned(begin[1]))
+        learned = _learned(self.learner.state())
         digest = sha256(b"".join(learned[name].tobytes() for name in sorted(learned))).hexdigest()
-        return {"timesteps": header["timesteps"], "sha256": digest}
+        return {"sha256": digest} if of_policy else {"timesteps": begin[0]["timesteps"], "sha256": digest}
 
     def learn(self) -> dict[str, Any]:
         """Train until the configured timesteps are done or a signal stops it; return the record."""
@@ -306,3 +311,8 @@ class Session(BaseCallback):
         if status == "interrupted" and self._stopping.signal is not None:
             self._record["signal"] = self._stopping.signal.name
         write_record(self._out, self._record)
+
+
+def _learned(arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Return those of a learner's `arrays` that another training may begin with."""
+    return {name: values for name, values in arrays.items() if name.startswith(LEARNED_ARRAYS)}

@@ -17,7 +17,7 @@ from springfoot.files.locks import owned
 from springfoot.files.text_table import has_content
 from springfoot.files.writing import remove_temporary, require_new
 
-from ..policies.policy import BEST, LAST, RUN
+from ..policies.policy import BEST, LAST, RUN, SHIPPED, Policy, read_policy
 from .callbacks import UserCallback
 from .checkpoint import Checkpoint, newest_checkpoint
 from .config import TrainingConfig, config_from_json, config_to_json
@@ -37,24 +37,28 @@ def train(
     evaluation's entry of `run.json` (a dictionary). One that returns False ends the training, with status
     `interrupted`. The first SIGINT or SIGTERM also ends it in good order: status `interrupted`, policies usable. A
     second one ends it at once. With `begin_from`, a run's folder, the network and the running statistics begin as that
-    run's newest checkpoint has them. Raises `SpringfootError`, with nothing written, if `out` exists and is not an
-    empty folder, if another process writes into it, or if that network does not fit.
+    run's newest checkpoint has them; with a policy, its file or name, the critic is untrained. Raises
+    `SpringfootError`, with nothing written, if `out` exists and is not an empty folder, if another process writes into
+    it, or if that network does not fit.
     """
     out = require_new(out)
-    begin = None if begin_from is None else _checkpoint_to_begin_from(Path(begin_from))
+    begin = None if begin_from is None else _beginning(begin_from)
     with owned(out):
         remove_temporary(require_new(out))  # checked again, now that no other process can write into it
         return Session(config, out, {"sessions": [], "evaluations": []}, callbacks=callbacks, begin=begin).learn()
 
 
-def _checkpoint_to_begin_from(run: Path) -> Checkpoint:
-    """Return the newest checkpoint of the run in the folder `run`, with which another training begins.
+def _beginning(source: str | Path) -> Checkpoint | Policy:
+    """Return the beginning of another training: the newest checkpoint of the run in the folder `source`, or the policy
+    in that file or of that name.
 
     Raises `SpringfootError` if there is none.
     """
-    checkpoint = newest_checkpoint(run) if run.is_dir() else None
+    if str(source) in SHIPPED or Path(source).is_file():
+        return read_policy(source)
+    checkpoint = newest_checkpoint(Path(source)) if Path(source).is_dir() else None
     if checkpoint is None:
-        raise SpringfootError(f"{run} holds no checkpoint to begin from: give the folder of a run")
+        raise SpringfootError(f"{source} holds no checkpoint to begin from: give the folder of a run, or a policy")
     return checkpoint
 
 

@@ -64,8 +64,23 @@ def test_a_network_that_does_not_fit_is_refused(run, tmp_path):
         train(person, tmp_path / "person", begin_from=run)
     with pytest.raises(SpringfootError, match="the training state does not fit its configuration"):
         train(dataclasses.replace(SHORT, hidden=(32,)), tmp_path / "small", begin_from=run)
-    with pytest.raises(SpringfootError, match="holds no checkpoint to begin from: give the folder of a run"):
+    with pytest.raises(SpringfootError, match="holds no checkpoint to begin from: give the folder of a run, or a"):
         train(SHORT, tmp_path / "none", begin_from=tmp_path / "nowhere")
+
+
+def test_it_begins_with_a_policy_alone(run, tmp_path):
+    path = run / "last.safetensors"
+    train(SHORT, tmp_path / "next", begin_from=path)
+    before, after = read_record(run), read_record(tmp_path / "next")
+    untrained, *_, trained = [entry["return_mean"] for entry in before["evaluations"]]
+    assert abs(after["evaluations"][0]["return_mean"] - trained) < 0.1 * abs(untrained - trained)
+    assert set(after["sessions"][0]["begun_from"]) == {"sha256"}
+    with pytest.raises(
+        SpringfootError, match=r"the policy to begin from does not fit: its layers are 43 64 64 4, those"
+    ):
+        train(dataclasses.replace(SHORT, hidden=(32,)), tmp_path / "small", begin_from=path)
+    with pytest.raises(SpringfootError, match="the policy to begin from was trained on another version of this env"):
+        train(dataclasses.replace(SHORT, environment=BipedSettings(acts="both")), tmp_path / "b", begin_from="medium")
 
 
 def test_a_run_without_its_first_checkpoint_is_not_begun_anew_from_nothing(run, tmp_path):
