@@ -37,6 +37,8 @@ UNDISTURBED: dict[str, Any] = {
 Watch = Callable[[float], Callable[[float], object]]
 """Function that starts a report of progress: it takes the length of a walk [s], and returns a function to call with the
 seconds of each step."""
+ALIKE = 0.1
+"""Root-mean-square difference of log K up to which the mean schedules of two legs are alike, 10 % of K; chosen."""
 SAME_K = 1e-9
 """Variance of log K below which K counts as constant."""
 
@@ -47,16 +49,6 @@ def deciding_legs(settings: BipedSettings) -> list[int]:
     A leg with a device at ankle or toe is left out: the device has a stiffness of its own.
     """
     return [side for side, foot in enumerate(settings.feet) if not any(joint.device for joint in foot.joints)]
-
-
-def alike_legs(settings: BipedSettings) -> list[list[int]]:
-    """Return the `deciding_legs`, or both legs if there are none, in groups of legs with equal feet.
-
-    [[0, 1]] for equal feet, [[0], [1]] for different ones; 0 is the left leg.
-    """
-    legs = deciding_legs(settings) or [LEFT, RIGHT]
-    left, right = settings.feet
-    return [legs] if left == right else [[leg] for leg in legs]
 
 
 def decisions_of(
@@ -126,6 +118,26 @@ def _mean_stiffness(phase: NDArray, stiffness: NDArray) -> NDArray:
     return np.stack([np.interp(GRID, knot_phases, curve, period=1.0) for curve in knots.T], -1)
 
 
+def alike_legs(recording: Recording) -> list[list[int]]:
+    """Return the `deciding_legs` of a walk, or both legs if there are none, in groups of legs that are alike.
+
+    [[0, 1]] for equal feet with mean K over the stride within `ALIKE`, else [[0], [1]]; 0 is the left leg.
+    """
+    legs = deciding_legs(recording.settings) or [LEFT, RIGHT]
+    left, right = recording.settings.feet
+    return [legs] if left == right and _differ_by(recording, legs) <= ALIKE else [[leg] for leg in legs]
+
+
+def _differ_by(recording: Recording, legs: Sequence[int]) -> float:
+    """Return the root-mean-square difference of log K between the mean schedules of both `legs`, the larger of ankle
+    and toe; 0 without decisions of both."""
+    decisions = [decisions_of(recording, [leg]) for leg in legs]
+    if len(decisions) < 2 or not all(len(phase) for phase, _ in decisions):
+        return 0.0
+    one, other = (np.log(_mean_stiffness(*of_leg)) for of_leg in decisions)
+    return float(np.sqrt(np.square(one - other).mean(0)).max())
+
+
 def feedback(recording: Recording) -> dict[str, dict[str, float | None]]:
     """Return `feedback` of metrics.json: the variation of log K of ankle and toe that the phase does not explain.
 
@@ -135,7 +147,7 @@ def feedback(recording: Recording) -> dict[str, dict[str, float | None]]:
     schedule has next to none, be it smooth or constant but for jumps. Legs with different feet have schedules of their
     own: the variances of each leg are averaged.
     """
-    by_leg = [decisions_of(recording, legs) for legs in alike_legs(recording.settings)]
+    by_leg = [decisions_of(recording, legs) for legs in alike_legs(recording)]
     # log K (n, 2) of each group of legs, in the order of the phase
     logarithms = [np.log(stiffness[np.argsort(phase)]) for phase, stiffness in by_leg if len(phase) >= 2]
     if not logarithms:
@@ -167,23 +179,23 @@ def open_loop_copy(
         watch: reports the progress of the walk from which the mean is taken, see `Watch`.
 
     The mean is of both legs together at equal phase of the leg, by least squares (`mean_over_phase`); of each leg by
-    itself if the feet differ. If other speeds can be commanded, it is taken at each tabulated speed, and is linear
-    between them; K scales with the body. The equilibrium is that of the settings. A residual action can leave the range
-    of absolute actions, a copy cannot: K beyond the range becomes its nearer end. Raises `SpringfootError` for a policy
-    that walks no strides, and for one that moves the legs too.
+    itself if they are not alike (`alike_legs`). If other speeds can be commanded, it is taken at each tabulated speed,
+    and is linear between them; K scales with the body. The equilibrium is that of the settings. A residual action can
+    leave the range of absolute actions, a copy cannot: K beyond the range becomes its nearer end. Raises
+    `SpringfootError` for a policy that walks no strides, and for one that moves the legs too.
     """
     if settings.acts != "stiffness":
         raise SpringfootError(f"{name} has no open-loop copy: it moves the legs too (acts {settings.acts!r})")
     undisturbed = replace(settings, **(UNDISTURBED | dict.fromkeys(DRAWN_SETTINGS)))
-    groups = alike_legs(settings)
-    # Group of each side. A leg with a device is in none, and follows no K: the other leg's stands in.
-    group_of = [next((number for number, legs in enumerate(groups) if side in legs), 0) for side in range(len(SIDES))]
     means: dict[float, NDArray] = {}  # by speed; without the speeds at which the policy walks no strides
     speeds = tabulated_speeds(settings).tolist()
     recorded: dict[str, Any] = {"name": name, "episodes": COPY_EPISODES, "threads": threads}
     recorded["progress"] = watch(len(speeds) * COPY_EPISODES * COPY_SECONDS)
     for speed in speeds:
         recording = record(policy, replace(undisturbed, speed=speed), **recorded)
+        groups = alike_legs(recording)
+        # Group of each side. A leg with a device is in none, and follows no K: the other leg's stands in.
+        group_of = [next((k for k, legs in enumerate(groups) if side in legs), 0) for side in range(len(SIDES))]
         decisions = [decisions_of(recording, legs) for legs in groups]
         if all(len(phase) for phase, _ in decisions):
             curves = [_mean_stiffness(phase, stiffness) for phase, stiffness in decisions]

@@ -33,13 +33,13 @@ STATES = ("loading", "early mid-stance", "late mid-stance", "early push-off", "l
 def write_schedules(folder: Path, recording: Recording) -> None:
     """Write `stiffness_schedule.csv` and, unless both feet have a device, `finite_states.json`.
 
-    Where both legs decide and the feet differ, each leg has its own, `finite_states_left.json` and `_right`.
+    Where both legs decide and are not alike (`alike_legs`), each has its own, `finite_states_left.json` and `_right`.
     """
     settings = recording.settings
     body = body_of(recording.settings)
     text = schedule_csv(recording.policy, body, settings.speed, settings.equilibrium, schedule_curves(recording))
     (folder / "stiffness_schedule.csv").write_text(text, encoding="utf-8", newline="")
-    groups = alike_legs(settings) if deciding_legs(settings) else []
+    groups = alike_legs(recording) if deciding_legs(settings) else []
     for legs in groups:
         table = states_json(finite_states(recording, legs))
         end = f"_{SIDES[legs[0]]}" if len(groups) > 1 else ""

@@ -174,14 +174,12 @@ def test_without_a_leg_that_decides_there_is_no_table_of_finite_states(recording
     assert [path.name for path in tmp_path.iterdir()] == ["stiffness_schedule.csv"]
 
 
-def test_legs_with_different_feet_have_states_and_feedback_of_their_own(recordings, tmp_path):
+@pytest.mark.parametrize("foot", ["intact", "weak"])
+def test_legs_with_different_feet_or_stiffness_have_states_and_feedback_of_their_own(recordings, tmp_path, foot):
     recording = recordings[2]
-    settings = replace(recording.settings, right_foot="weak")
     stiffness = np.ones_like(recording.series["stiffness"]) * [[200.0, 30.0], [300.0, 60.0]]
-    planted = replace(recording, settings=settings, series=recording.series | {"stiffness": stiffness})
+    planted = with_stiffness(recording, stiffness, right_foot=foot)
     assert feedback(planted) == {joint: {"share": 0.0, "spread": 0.0} for joint in ("ankle", "toe")}
-    pooled = feedback(replace(planted, settings=recording.settings))["toe"]["spread"]
-    assert pooled is not None and pooled > 0.1
     write_schedules(tmp_path, planted)
     tables = sorted(path.name for path in tmp_path.glob("*.json"))
     assert tables == ["finite_states_left.json", "finite_states_right.json"]
@@ -189,6 +187,23 @@ def test_legs_with_different_feet_have_states_and_feedback_of_their_own(recordin
         states = json.loads((tmp_path / name).read_text(encoding="utf-8"))["states"]
         assert {state["toe"]["stiffness_Nm_per_rad"] for state in states} == {toe}
         assert policy_and_settings(str(tmp_path / name), {})[1].equilibrium == "phase"  # a policy again
+
+
+@pytest.mark.parametrize(("apart", "tables"), [(0.09, 1), (0.11, 2)])
+def test_legs_with_equal_feet_are_alike_within_a_tenth_of_their_stiffness(recordings, tmp_path, apart, tables):
+    recording = recordings[2]
+    stiffness = np.ones_like(recording.series["stiffness"]) * [[200.0, 30.0], [200.0, 30.0 * np.exp(apart)]]
+    planted = with_stiffness(recording, stiffness)
+    write_schedules(tmp_path, planted)
+    assert len(list(tmp_path.glob("*.json"))) == tables
+    spread = feedback(planted)["toe"]["spread"]
+    assert spread is not None and (spread > 0.01) == (tables == 1)  # of both legs together they differ at equal phase
+
+
+def with_stiffness(recording, stiffness, **feet):
+    """The recording with other K, (episodes, ticks, legs, 2), and feet."""
+    settings = replace(recording.settings, **feet)
+    return replace(recording, settings=settings, series=recording.series | {"stiffness": stiffness})
 
 
 def test_a_copy_open_loop_keeps_the_stiffness_of_legs_with_different_feet():

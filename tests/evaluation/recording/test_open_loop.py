@@ -102,8 +102,9 @@ def test_a_copy_of_a_policy_has_its_mean_stiffness_and_equilibrium_and_follows_t
     assert pushed.series["stiffness"].shape[-1] == 2 and own is not copy
     for joint in ("ankle", "toe"):
         assert of_feedback(pushed, joint, "spread") < 0.02 < of_feedback(policy, joint, "spread")
-    means = [mean_over_phase(*decisions_of(each)) for each in (policy, walked("frozen:pretrained"))]
-    assert means[1][1:31] == pytest.approx(means[0][1:31], rel=0.1)  # in stance; of other episodes
+    for leg in (0, 1):  # whose toes the policy treats differently
+        means = [mean_over_phase(*decisions_of(each, [leg])) for each in (policy, walked("frozen:pretrained"))]
+        assert means[1][2:28] == pytest.approx(means[0][2:28], rel=0.1)  # in stance; of other episodes
     at = np.linspace(0.05, 0.95, 40)
     rest = [
         np.stack([np.interp(at, x, y) for y in angles.T])

@@ -32,7 +32,7 @@ def test_springs_have_the_numbers_of_the_study_of_orthoses(tmp_path, capsys):
         assert own["speed_m_s"] == expected["walked_m_s"]
         for name in ("falls", "fibre_J_kg_m", "effort", "push_off_J_kg", "sound_peak_bw", "knee_moment_Nm_kg"):
             assert own[name] == expected[name]
-    assert "What this cannot say" in text and "the nearest speed to the asked one that all walk" in text
+    assert "What this cannot say" in text and "the nearest to the asked speed that all walk" in text
     page = (tmp_path / "feet" / "report.html").read_text(encoding="utf-8")
     assert all(page.count(name) > 1 for name in feet)  # a tab for each foot
     assert (tmp_path / "feet" / "feet.png").stat().st_size > 10_000
