@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 from springfoot.lazy import lazy_names
 
 if TYPE_CHECKING:
+    from .open_loop import alike_legs
     from .policies import policy_and_settings, policy_label
     from .recording import (
         BATCH,
@@ -26,6 +27,7 @@ __all__ = [
     "WARM_UP",
     "Episodes",
     "Recording",
+    "alike_legs",
     "planned_course",
     "policy_and_settings",
     "policy_label",
@@ -45,6 +47,7 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
             "WARM_UP": "recording",
             "Episodes": "recording",
             "Recording": "recording",
+            "alike_legs": "open_loop",
             "planned_course": "recording",
             "policy_label": "policies",
             "policy_and_settings": "policies",

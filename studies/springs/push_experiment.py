@@ -14,7 +14,7 @@ from scipy.signal import lfilter
 from springfoot.agents.policies import PolicyFunction, has_feedback
 from springfoot.arrays import NDArray
 from springfoot.envs.control import FEET, PLATEAUS
-from springfoot.envs.physics import ANKLE
+from springfoot.envs.physics import ANKLE, LEFT, RIGHT, SIDES
 from springfoot.envs.settings import BipedSettings
 from springfoot.errors import SpringfootError
 from springfoot.evaluation.recording import TICK, WARM_UP, Recording, policy_and_settings
@@ -49,8 +49,11 @@ def prepare_pushed(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Samples:
-    """Measurements that a laboratory would have at n instants of walking, both legs together, and the truth."""
+    """Measurements that a laboratory would have at n instants of walking, legs that are alike together, and the
+    truth."""
 
+    leg: str
+    """Leg of the measurements, `left`, `right` or `both`."""
     trial: NDArray
     """(n,) episode of the instant."""
     phase: NDArray
@@ -70,8 +73,11 @@ class Samples:
     """(COURSE, 2) mean torque over the phase, without noise [N m]."""
 
 
-def samples(recording: Recording, noise_percent: float = 0.0, seed: int = 0) -> Samples:
-    """Return the samples of a recording after the warm-up, without the last second of an episode that fell.
+def samples(
+    recording: Recording, noise_percent: float = 0.0, seed: int = 0, legs: Sequence[int] = (LEFT, RIGHT)
+) -> Samples:
+    """Return the samples of these `legs` (0 left, 1 right) of a recording together, after the warm-up and without the
+    last second of an episode that fell.
 
     `seed` is that of the noise on the torque. The noise of the torque has a standard deviation of `noise_percent` of
     the largest torque of the joint's mean course, and a correlation time of `NOISE_LASTS`.
@@ -88,7 +94,7 @@ def samples(recording: Recording, noise_percent: float = 0.0, seed: int = 0) -> 
     tick = np.arange(phase.shape[1])
     end = recording.ticks - np.where(recording.fall_reason == "", 0, round(LAST_SECOND / TICK))
     walked = (tick >= round(WARM_UP / TICK)) & (tick < end[:, None])
-    keep = walked[..., None] & np.isfinite(states).all(-1)
+    keep = walked[..., None] & np.isfinite(states).all(-1) & np.isin(range(len(SIDES)), legs)
     if not keep.any():
         raise SpringfootError(f"{recording.policy} walks no strides after {WARM_UP:g} s whose springs could be found")
     torque = series["torque"][..., FEET]
@@ -101,6 +107,7 @@ def samples(recording: Recording, noise_percent: float = 0.0, seed: int = 0) -> 
     noise = lfilter([np.sqrt(1 - a**2)], [1, -a], white, axis=1)[keep]
     trial = np.broadcast_to(np.arange(len(phase))[:, None, None], phase.shape)
     return Samples(
+        leg=SIDES[legs[0]] if len(legs) == 1 else "both",
         trial=trial[keep],
         phase=phase[keep],
         torque=torque[keep] + noise_percent / 100 * np.abs(course).max(0) * noise,
@@ -116,6 +123,8 @@ def samples(recording: Recording, noise_percent: float = 0.0, seed: int = 0) -> 
 class Row:
     """Spring of one joint in one phase: the applied one, and its estimates."""
 
+    leg: str
+    """Leg of the joint, `left`, `right`, or `both` where they are alike."""
     joint: str
     """Joint, one of `SPRINGS`."""
     start: float
@@ -163,6 +172,7 @@ def identified(pushed: Samples, undisturbed: Samples | None = None, margin: floa
             in_phase = mean_torque[(course_phase >= spring.start) & (course_phase < spring.end)]
             rows.append(
                 Row(
+                    leg=pushed.leg,
                     joint=joint,
                     start=spring.start,
                     end=spring.end,

@@ -18,7 +18,7 @@ from springfoot.envs.control import FEET
 from springfoot.envs.physics import damping_times
 from springfoot.envs.settings import body_of
 from springfoot.errors import SpringfootError, require_count, require_number
-from springfoot.evaluation.recording import record
+from springfoot.evaluation.recording import alike_legs, record
 from springfoot.files.markdown import MISSING, table
 from springfoot.files.writing import csv_text
 from springfoot.gait.springs import REACTS, SPRING, SPRINGS, Estimate
@@ -45,7 +45,7 @@ class Experiment:
     damping_time: tuple[float, float]
     """True beta of ankle and toe [s]."""
     rows: tuple[Row, ...]
-    """Joint by joint, phase by phase."""
+    """Leg by leg where they are not alike, joint by joint, phase by phase."""
     repeats: tuple[tuple[Row, ...], ...] = ()
     """Rows of every repeat, each on other episodes."""
 
@@ -59,7 +59,10 @@ class Experiment:
 
 
 def springs_table(experiment: Experiment) -> str:
-    """Return the Markdown table with a line for each joint and phase under load: applied K, estimates, verdict."""
+    """Return the Markdown table with a line for each joint and phase under load: applied K, estimates, verdict.
+
+    Legs that are not alike have lines of their own.
+    """
     head = (
         "",
         "% of stride",
@@ -80,7 +83,7 @@ def springs_table(experiment: Experiment) -> str:
         varies = high - low > 0.01 * mean  # by more than the rounding of a constant K
         lines.append(
             (
-                row.joint,
+                row.joint if row.leg == "both" else f"{row.leg} {row.joint}",
                 f"{100 * row.start:.0f}–{100 * row.end:.0f}",
                 f"{mean:.1f} ({low:.0f}–{high:.0f})" if varies else f"{mean:.1f}",
                 _interval(spring.stiffness, 1.0),
@@ -132,10 +135,11 @@ def coverage_table(experiments: Sequence[Experiment]) -> str:
 
 
 def springs_csv(experiments: Sequence[Experiment]) -> str:
-    """Return the CSV with a line for each policy, repeat, joint and phase; repeat 0 is the experiment itself."""
+    """Return the CSV with a line for each policy, repeat, leg, joint and phase; repeat 0 is the experiment itself."""
     spans = [f"{name}{end}" for name in ("stiffness_Nm_rad", "damping_time_s") for end in ("", "_low", "_high")]
     head = (
-        *("policy", "repeat", "joint", "start", "end", "load", "applied_Nm_rad", "applied_lowest", "applied_highest"),
+        *("policy", "repeat", "leg", "joint", "start", "end", "load"),
+        *("applied_Nm_rad", "applied_lowest", "applied_highest"),
         *("samples", "trials", *spans, "explained", "reaction", "reaction_p", "angle_spread_rad", "verdict", "reason"),
         "undisturbed_Nm_rad",
     )
@@ -147,7 +151,7 @@ def springs_csv(experiments: Sequence[Experiment]) -> str:
                 undisturbed = row.undisturbed and row.undisturbed.stiffness
                 estimates = [*(spring.stiffness or [None] * 3), *(spring.damping_time or [None] * 3)]
                 numbers = (spring.explained, spring.reaction, spring.reaction_p, spring.angle_spread)
-                labels = (experiment.policy, repeat, row.joint, row.start, row.end, row.load, *row.applied)
+                labels = (experiment.policy, repeat, row.leg, row.joint, row.start, row.end, row.load, *row.applied)
                 result = (spring.samples, spring.trials, *estimates, *numbers, spring.verdict, spring.reason)
                 lines.append((*labels, *result, undisturbed and undisturbed.value))
     return csv_text(head, lines)
@@ -250,8 +254,8 @@ class Identify(WalkingStudy):
         further += f" {100 * self.margin:g} % of the stride left out at both ends of each phase." if self.margin else ""
         return (
             f"A push of ±{self.push_newton:g} N × {self.push_seconds:g} s at a random time in each "
-            f"{self.push_interval:g} s; both legs together; noise on the torque of {self.noise_percent:g} % of the "
-            f"mean stride's largest, lasting 50 ms.{further}"
+            f"{self.push_interval:g} s; legs that are alike together, others apart; noise on the torque of "
+            f"{self.noise_percent:g} % of the mean stride's largest, lasting 50 ms.{further}"
         )
 
     def _identify_policy(self, name: str, progress: OnProgress) -> Experiment:
@@ -265,13 +269,18 @@ class Identify(WalkingStudy):
         pushed = record(policy, settings, episodes=self.episodes, seed=self.seed, **common)
         without_pushes = replace(settings, push_newton=0.0)
         undisturbed = record(policy, without_pushes, episodes=UNDISTURBED_EPISODES, seed=self.seed, **common)
-        rows = identified(samples(pushed, self.noise_percent, self.seed), samples(undisturbed), self.margin)
+        groups = alike_legs(undisturbed)
+        rows: list[Row] = []
+        for legs in groups:
+            noisy = samples(pushed, self.noise_percent, self.seed, legs)
+            rows += identified(noisy, samples(undisturbed, legs=legs), self.margin)
         repeats = []
         shorter = replace(settings, episode_seconds=REPEAT_SECONDS)
         for repeat in range(self.repeats):
             first_seed = self.seed + self.episodes + repeat * REPEAT_EPISODES
             again = record(policy, shorter, episodes=REPEAT_EPISODES, seed=first_seed, **common)
-            repeats.append(tuple(identified(samples(again, self.noise_percent, first_seed), margin=self.margin)))
+            noisy_again = [samples(again, self.noise_percent, first_seed, legs) for legs in groups]
+            repeats.append(tuple(row for noisy in noisy_again for row in identified(noisy, margin=self.margin)))
         ankle, toe = damping_times(body_of(settings))[FEET]
         return Experiment(
             policy=name,

@@ -8,8 +8,9 @@ import pytest
 from springfoot.cli.main import study_main
 from springfoot.envs.control.constants import leg_constants
 from springfoot.envs.control.stiffness_control import FEET
-from springfoot.envs.physics.model import damping_times
+from springfoot.envs.physics.model import LEFT, RIGHT, damping_times
 from springfoot.envs.settings.settings import body_of
+from springfoot.evaluation.recording.open_loop import alike_legs
 from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.evaluation.recording.recording import record
 from springfoot.gait import SpringfootError
@@ -20,9 +21,9 @@ PUSHES = {"push_newton": 100.0, "push_interval": 2.0, "episode_seconds": 5.0}
 
 
 @cache
-def pushed(name, decisions=None):
+def pushed(name, decisions=None, episodes=32):
     policy, settings = prepare_pushed(name, PUSHES | ({"decisions": decisions} if decisions else {}))
-    return record(policy, settings, name=name, episodes=32)
+    return record(policy, settings, name=name, episodes=episodes)
 
 
 def loaded(rows: list[Row]) -> list[Row]:
@@ -41,13 +42,21 @@ def test_torque_is_recorded_at_the_same_instant_as_angle_and_velocity():
 def test_springs_are_found_in_every_loaded_phase_ramps_included():
     rows = loaded(identified(samples(pushed("schedule"))))
     assert {row.joint for row in rows} == {"ankle", "toe"} and len(rows) >= 8
-    rows += loaded(identified(samples(pushed("frozen:pretrained"))))  # whose ramps are steeper
+    for leg in (LEFT, RIGHT):  # whose ramps are steeper, and toes unlike
+        rows += loaded(identified(samples(pushed("frozen:pretrained", episodes=64), legs=[leg])))
     for row in rows:
         assert row.pushed.stiffness and row.pushed.damping_time
         assert row.pushed.stiffness.value == pytest.approx(row.applied[0], rel=0.01)
         assert row.pushed.damping_time.value == pytest.approx(0.02, rel=0.05)
         assert row.pushed.verdict == SPRING
     assert any(row.applied[2] > 3 * row.applied[1] for row in rows)
+
+
+def test_legs_that_are_not_alike_are_no_spring_together():
+    together = loaded(identified(samples(pushed("frozen:pretrained", episodes=64))))
+    assert {row.pushed.verdict for row in together if row.joint == "toe"} == {REACTS}
+    assert alike_legs(pushed("schedule")) == [[LEFT, RIGHT]]
+    assert alike_legs(pushed("frozen:pretrained", episodes=64)) == [[LEFT], [RIGHT]]
 
 
 def test_noise_on_the_torque_leaves_the_truth_within_intervals_and_the_undisturbed_estimator_is_blind():
