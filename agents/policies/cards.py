@@ -8,6 +8,13 @@ from springfoot.files.text_table import read_bytes
 
 from .policy import PRETRAINED_BY, SHIPPED, find_policy, read_policy
 
+_ON = "--timesteps 9000000 --update-steps 30720 --minibatches 16 --epochs 6"
+_WEIGHTS = '{"alive": 8, "pose": %d, "grf": 12, "speed_held": -60, "fibre_work": %d}'
+LEARNED_2_BY = "`, then `".join(
+    f"springfoot train --preset person --begin-from {begin} {_ON} --reward-weights '{_WEIGHTS % weights}' --out {out}"
+    for begin, weights, out in (("learned", (4, -5), "runs/first"), ("runs/first", (7, -6), "runs/second"))
+)
+"""Commands that made `learned-2` from `learned`."""
 MADE = {
     "pretrained": ("Walks on level ground at 1.2 m/s, and goes on when it is pushed.", PRETRAINED_BY, "walk"),
     "medium": (
@@ -19,6 +26,11 @@ MADE = {
     "learned": (
         "Moves hips, knees and ankles too, on any foot, body, speed and slope that the training drew.",
         "springfoot train --preset person",
+        "feet",
+    ),
+    "learned-2": (
+        "The same, trained on with larger updates: it falls less and lands more like people.",
+        LEARNED_2_BY,
         "feet",
     ),
 }

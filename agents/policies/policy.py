@@ -53,6 +53,7 @@ SHIPPED = {
     "medium": _PRETRAINED / "medium.safetensors",
     "predicted": _PRETRAINED / "predicted.safetensors",
     "learned": person_file("learned"),
+    "learned-2": person_file("learned-2"),
 }
 """Name of a policy of this package -> its file; `policy_card` describes each."""
 PRETRAINED_BY = "springfoot train --push-newton 250 --timesteps 14000000 --out runs/pretrained"

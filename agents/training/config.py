@@ -107,6 +107,13 @@ _BRACE = {"ankle_stiffness": [20, 520], "ankle_deg": [-8, 4]}
 _ONE_WAY = _BRACE | {"engages": "dorsiflexion"}
 _HEAVIER = {"shank_mass_ratio": [1.0, 1.3], "foot_mass_ratio": [1.0, 2.0]}
 _WEAK = {"kind": "weak", "strength": [0.15, 0.6]}
+_PASSIVE = {
+    "kind": "passive",
+    "ankle_stiffness": [150, 1500],
+    "ankle_deg": [0, 8],
+    "toe_stiffness": [15, 200],
+    "shank_mass_ratio": [0.6, 1.1],
+}
 DRAWN_FEET: list[dict[str, Any]] = [
     {"foot": "intact", "on": "both", "weight": 30},
     {"foot": {"kind": "intact", "orthosis": _BRACE}, "on": "both", "weight": 8},
@@ -120,22 +127,16 @@ DRAWN_FEET: list[dict[str, Any]] = [
     {"foot": _WEAK, "on": "both", "weight": 5},
     {"foot": _WEAK | {"orthosis": _BRACE}, "on": "both", "weight": 6},
     {"foot": _WEAK | {"orthosis": _BRACE}, "weight": 3},
-    {
-        "foot": {
-            "kind": "passive",
-            "ankle_stiffness": [150, 1500],
-            "ankle_deg": [0, 8],
-            "toe_stiffness": [15, 200],
-            "shank_mass_ratio": [0.6, 1.1],
-        },
-        "weight": 16,
-    },
+    {"foot": _PASSIVE, "weight": 16},
     {"foot": {"kind": "adaptive", "ankle_deg": [0, 8]}, "weight": 5},
     {"foot": "rigid", "weight": 8},
     {"foot": "rigid_toe", "weight": 2},
     {"foot": "no_toe", "weight": 2},
     {"foot": "drop", "weight": 4},
     {"foot": {"kind": "drop", "orthosis": {"ankle_stiffness": [0.3, 60], "ankle_deg": [0, 10]}}, "weight": 6},
+    {"foot": _PASSIVE, "on": "both", "weight": 4},
+    {"foot": "rigid_toe", "on": "both", "weight": 2},
+    {"foot": "no_toe", "on": "both", "weight": 2},
 ]
 """Feet that a person learns to walk on; sound ones come often enough, as the person's walk on them is the measure."""
 DRAWN_BODIES = [
