@@ -62,7 +62,7 @@ TRAIN = [
 ]
 POLICIES = (
     "give a .safetensors or .onnx file, a run folder, a schedule in a .csv or .json file, module:function, frozen:POLICY, "
-    "or one of pretrained, medium, predicted, learned, untrained, random, constant, schedule, "
+    "or one of pretrained, medium, predicted, learned, learned-2, untrained, random, constant, schedule, "
     "quasi_stiffness, thesis, thesis_printed"
 )
 COMMANDS_IN_WORDS = "train, evaluate, live, feet, person, score, export, study, datasets, examples and completion"

@@ -80,10 +80,12 @@ def test_mean_and_spread_of_a_schedule_are_those_put_in():
     assert curves["ankle_left_stiffness_Nm_per_rad_sd"].mean() == pytest.approx(expected, rel=0.1)
 
 
-def test_the_finite_states_of_a_walk_are_a_policy_that_walks(folder):
-    table = json.loads((folder / "finite_states.json").read_text(encoding="utf-8"))
+@pytest.mark.parametrize("side", SIDES)
+def test_the_finite_states_of_a_walk_are_a_policy_that_walks(folder, side):
+    file = folder / f"finite_states_{side}.json"  # its toes are not alike
+    table = json.loads(file.read_text(encoding="utf-8"))
     assert [state["name"] for state in table["states"]] == list(STATES)
-    played = walked(folder / "finite_states.json", episodes=20, episode_seconds=20.0)
+    played = walked(file, episodes=20, episode_seconds=20.0)
     assert (played.fall_reason == "").all() and played.settings.equilibrium == "phase"
     lines = played.settings.schedule
     assert lines is not None
@@ -95,13 +97,13 @@ def test_the_finite_states_of_a_walk_are_a_policy_that_walks(folder):
 
 
 def test_a_finite_state_has_the_mean_stiffness_and_the_mean_torque_of_the_walk(folder, recording):
-    states = json.loads((folder / "finite_states.json").read_text(encoding="utf-8"))["states"]
+    states = json.loads((folder / "finite_states_left.json").read_text(encoding="utf-8"))["states"]
     after = {
-        name: values[:, 300:].reshape(-1, *values.shape[3:])
+        name: values[:, 300:, 0].reshape(-1, *values.shape[3:])
         for name, values in recording.series.items()
         if name in ("angle", "velocity", "torque", "stiffness")
     }
-    phase = recording.series["phase"][:, 300:].ravel() % 1.0
+    phase = recording.series["phase"][:, 300:, 0].ravel() % 1.0
     inside = (phase >= states[2]["phase"]) & (phase < states[3]["phase"])
     ankle = {name: values[inside, 0 if name == "stiffness" else 2].mean() for name, values in after.items()}
     own = states[2]["ankle"]
@@ -113,7 +115,7 @@ def test_a_finite_state_has_the_mean_stiffness_and_the_mean_torque_of_the_walk(f
 
 
 def test_schedules_scale_with_the_body_and_go_with_flags(folder):
-    for name in ("stiffness_schedule.csv", "finite_states.json"):
+    for name in ("stiffness_schedule.csv", "finite_states_right.json"):
         observation = np.zeros((3, 43), np.float32)
         small, large = (
             policy_and_settings(str(folder / name), {"height": h, "mass": m}) for h, m in ((1.6, 55.0), (1.9, 95.0))

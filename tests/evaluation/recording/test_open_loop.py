@@ -188,7 +188,7 @@ ERRORS = [
     (
         "frozen:nobody",
         "no policy 'nobody': give a .safetensors or .onnx file, a run folder, a schedule in a .csv or .json file, "
-        "module:function, frozen:POLICY, or one of pretrained, medium, predicted, learned, "
+        "module:function, frozen:POLICY, or one of pretrained, medium, predicted, learned, learned-2, "
         f"{', '.join(BASELINES)}",
     ),
 ]
