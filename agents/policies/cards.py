@@ -29,7 +29,7 @@ MADE = {
         "feet",
     ),
     "learned-2": (
-        "The same, trained on with larger updates: it falls less and lands more like people.",
+        "Went on from `learned`: falls less, holds speed better, works a little more; knees are farther from people's.",
         LEARNED_2_BY,
         "feet",
     ),

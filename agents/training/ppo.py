@@ -98,19 +98,22 @@ class Learner:
         )
 
     def begin_with(self, policy: Policy) -> None:
-        """Continue from the network and the observations' statistics of `policy`, with an untrained critic.
+        """Continue from the network and the observations' statistics of `policy`, critic and exploration untrained.
 
         Raises `SpringfootError` if it has other layers, another activation or bounds than the actor has.
         """
         layers, activation, output = actor_of(self.ppo.policy)
         shapes = [tuple(weight.shape) for weight, _ in layers]
-        own = (shapes, activation, output, self.normalized.clip_obs, self._mirror is not None)
-        given = [weight.shape for weight in policy.weights]
-        if own != (given, policy.activation, policy.output, policy.observation_clip, policy.mirror is not None):
-            raise SpringfootError(
-                f"the policy to begin from does not fit: its layers are {_widths(given, policy.mirror is not None)}, "
-                f"those of this training {_widths(shapes, self._mirror is not None)}"
-            )
+        own = _network_words(shapes, activation, output, self.normalized.clip_obs, self._mirror is not None)
+        given = _network_words(
+            [weight.shape for weight in policy.weights],
+            policy.activation,
+            policy.output,
+            policy.observation_clip,
+            policy.mirror is not None,
+        )
+        if own != given:
+            raise SpringfootError(f"the policy to begin from has a network of {given}, this training one of {own}")
         with torch.no_grad():
             for (weight, bias), own_weight, own_bias in zip(layers, policy.weights, policy.biases, strict=True):
                 weight.copy_(torch.from_numpy(own_weight))
@@ -166,10 +169,14 @@ class Learner:
         return {"observation": observation, "return": self.normalized.ret_rms}
 
 
-def _widths(shapes: Sequence[tuple[int, ...]], mirrored: bool) -> str:
-    """Return the widths of the layers whose weights have these shapes, and whether they act for one leg."""
-    widths = [shapes[0][1], *(outputs for outputs, _ in shapes)]
-    return f"{' '.join(map(str, widths))}{', mirrored' if mirrored else ''}"
+def _network_words(
+    shapes: Sequence[tuple[int, ...]], activation: str, output: str, clip: float | None, mirrored: bool
+) -> str:
+    """Return a network in words: the widths of the layers whose weights have these `shapes`, activation, bounds of
+    output and normalised observation, and whether it acts for one leg."""
+    widths = " - ".join(map(str, [shapes[0][1], *(outputs for outputs, _ in shapes)]))
+    bounds = f"output by {output}, observations within {'any size' if clip is None else f'{clip:g}'}"
+    return f"{widths}, {activation}, {bounds}{', mirrored' if mirrored else ''}"
 
 
 def _require_shape(name: str, value: np.ndarray, shape: tuple[int, ...]) -> None:

@@ -5,7 +5,7 @@ gait_cycle.csv, _left, _right   mean curves over percent of stride, and their sp
 strides.npz                     the 100 Hz series behind all of it
 every_stride.csv, .parquet      the curves of each stride
 gait.png, stiffness.png, walk.gif   pictures
-stiffness_schedule.csv, finite_states.json   K and theta_eq as tables, which are policies again
+stiffness_schedule.csv, finite_states.json (or _left, _right)   K and theta_eq as tables, which are policies again
 walk.mot, walk.sto, external_loads.xml, model.xml   the walk for OpenSim, the body for MuJoCo
 """
 

@@ -1,8 +1,8 @@
 """Ask how persons walk whom nobody tuned: on drawn bodies, feet, speeds and slopes, and on sound feet beside people.
 
-    springfoot study persons runs/person
+    springfoot study persons learned learned-2
 
-A person is a policy that `train.py --preset person` trained. The drawn episodes have the ranges of
+A person is a policy that `springfoot train --preset person` trained. The drawn episodes have the ranges of
 that preset and seeds that no training uses; in each the commanded speed stays.
 """
 

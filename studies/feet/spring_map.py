@@ -34,7 +34,7 @@ class SpringMap(WalkingStudy):
     """Walk persons with every spring in every case; a subclass says which springs and cases."""
 
     policies: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="POLICY ...")] = ("learned",)
-    """Persons that adapt to the feet: run folders, files, or `learned`."""
+    """Persons that adapt to the feet: run folders, files, `learned` or `learned-2`."""
     beside: str | None = "pretrained"
     """Policy that does not adapt, walked beside them; None for none."""
     episodes: int = 5

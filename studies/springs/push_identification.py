@@ -2,7 +2,7 @@
 
     springfoot study identify
     springfoot study identify schedule frozen:pretrained pretrained
-    springfoot study identify schedule frozen:pretrained --repeats 200
+    springfoot study identify schedule --repeats 200
 
 `frozen:POLICY` is a policy's mean K over the phase, played open loop (`springfoot.evaluation.recording.open_loop`).
 """

@@ -130,8 +130,8 @@ class ToeJoint(PersonsStudy):
             "the locked one, and its 95 % interval over persons and starts: of one person it tells how starts differ, "
             "and no more. Springs in N·m/rad, at a sound toe beside its muscles. "
             f"Persons: {', '.join(self.persons)}; {self.what_ran} of each toe and commanded speed, {asked} m/s; falls "
-            "are of all. People's effects are of docs/effects.csv; McDonald's people had one such foot. The package's "
-            "person learned with locked and absent toes and passive feet on one side alone, and with springs of 10 to "
+            "are of all. People's effects are of docs/effects.csv; McDonald's people had one such foot. `learned` "
+            "learned with locked and absent toes and passive feet on one side alone, and each with springs of 10 to "
             "180: where locked is far from a spring of 1000, suspect the person, not the toe."
         )
 

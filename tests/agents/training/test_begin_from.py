@@ -76,7 +76,7 @@ def test_it_begins_with_a_policy_alone(run, tmp_path):
     assert abs(after["evaluations"][0]["return_mean"] - trained) < 0.1 * abs(untrained - trained)
     assert set(after["sessions"][0]["begun_from"]) == {"sha256"}
     with pytest.raises(
-        SpringfootError, match=r"the policy to begin from does not fit: its layers are 43 64 64 4, those"
+        SpringfootError, match=r"the policy to begin from has a network of 43 - 64 - 64 - 4, tanh, .*, this"
     ):
         train(dataclasses.replace(SHORT, hidden=(32,)), tmp_path / "small", begin_from=path)
     with pytest.raises(SpringfootError, match="the policy to begin from was trained on another version of this env"):
