@@ -24,7 +24,7 @@ MADE = {
     ),
     "predicted": ("Walks by a plan that knows no person's curves.", "springfoot study predict", "prediction"),
     "learned": (
-        "Moves hips, knees and ankles too, on any foot, body, speed and slope that the training drew.",
+        "Moves hips, knees and ankles too, on any foot, body, speed and slope that it drew; the preset draws more now.",
         "springfoot train --preset person",
         "feet",
     ),

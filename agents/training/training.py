@@ -37,7 +37,7 @@ def train(
     evaluation's entry of `run.json` (a dictionary). One that returns False ends the training, with status
     `interrupted`. The first SIGINT or SIGTERM also ends it in good order: status `interrupted`, policies usable. A
     second one ends it at once. With `begin_from`, a run's folder, the network and the running statistics begin as that
-    run's newest checkpoint has them; with a policy, its file or name, the critic is untrained. Raises
+    run's newest checkpoint has them; with a policy, its file or name, critic and exploration are untrained. Raises
     `SpringfootError`, with nothing written, if `out` exists and is not an empty folder, if another process writes into
     it, or if that network does not fit.
     """
