@@ -20,7 +20,7 @@ from springfoot.command_line import exit_code
 from springfoot.envs.physics.model import build_model
 from springfoot.envs.physics.timing import CONTROL_WINDOW
 from springfoot.errors import SpringfootError, require_count
-from springfoot.gait.body.body import Body
+from springfoot.gait.body.body import GRAVITY, Body
 
 from .walking import Walk, record_walk
 
@@ -44,8 +44,27 @@ class Flags:
     """As Warp names it."""
 
 
-def rates(flags: Flags, walk: Walk, num: int) -> tuple[np.ndarray, float]:
-    """Return simulated seconds per second of each round, and the largest difference [rad] from the walk after 20 ms."""
+def floor_forces(walk: Walk) -> np.ndarray:
+    """Return the floor's force on each recorded body after 20 ms, by C MuJoCo: (RECORDED, 2), forward and up [N]."""
+    model = build_model(Body())
+    substeps = round(CONTROL_WINDOW / model.opt.timestep)
+    found = np.empty((RECORDED, 2))
+    for body, force in enumerate(found):
+        data = mujoco.MjData(model)
+        data.qpos, data.qvel = walk.position[0][body], walk.velocity[0][body]
+        for window in walk.controls[0]:
+            data.ctrl = window[body]
+            mujoco.mj_step(model, data, substeps)
+        force[:] = data.qfrc_constraint[:2]  # of the root's two slides: nothing but the floor pushes there
+    return found
+
+
+def rates(flags: Flags, walk: Walk, num: int) -> tuple[np.ndarray, float, float]:
+    """Return simulated seconds per second of each round, and how far Warp is from C MuJoCo after 20 ms.
+
+    The second value is the largest difference of an angle [rad] or of the root's place [m], the third the largest
+    difference of the floor's force as a fraction of the body's weight.
+    """
     wp, warp = _modules()
     model = build_model(Body())
     model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_MIDPHASE)  # C MuJoCo's own search, which Warp has not
@@ -79,7 +98,7 @@ def rates(flags: Flags, walk: Walk, num: int) -> tuple[np.ndarray, float]:
                 advance()
             graph = capture.graph
         found = []
-        apart = 0.0
+        apart = force_apart = 0.0
         for _ in range(flags.repeats + 1):
             begin()
             clock = perf_counter()
@@ -88,9 +107,11 @@ def rates(flags: Flags, walk: Walk, num: int) -> tuple[np.ndarray, float]:
                 advance() if graph is None else wp.capture_launch(graph)
                 if not found and index + 1 == len(walk.controls[0]):
                     apart = float(np.abs(data.qpos.numpy() - over_all(walk.position[1])).max())
+                    force = data.qfrc_constraint.numpy()[:, :2] - over_all(floor_forces(walk))
+                    force_apart = float(np.abs(force).max() / (GRAVITY * Body().mass))
             wp.synchronize()
             found.append(num * len(windows) * CONTROL_WINDOW / (perf_counter() - clock))
-    return np.array(found[1:]), apart
+    return np.array(found[1:]), apart, force_apart
 
 
 def _modules() -> tuple[Any, Any]:
@@ -116,9 +137,12 @@ def run(flags: Flags) -> None:
         f"{wp.get_device(flags.device).name}; simulated seconds per second, median (least to most) of {flags.repeats}"
     )
     for num in flags.sizes:
-        found, apart = rates(flags, walk, num)
+        found, apart, force = rates(flags, walk, num)
         low, middle, high = np.quantile(found, (0.0, 0.5, 1.0))
-        print(f"N = {num:6d}: {middle:,.0f} ({low:,.0f} to {high:,.0f}); after 20 ms within {apart:.0e} of C MuJoCo")
+        print(
+            f"N = {num:6d}: {middle:,.0f} ({low:,.0f} to {high:,.0f}); after 20 ms within {apart:.0e} of C MuJoCo, "
+            f"forces of the floor within {force:.0e} of body weight"
+        )
 
 
 def main() -> int:

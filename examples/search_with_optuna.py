@@ -1,6 +1,6 @@
-"""Search for how to train: Optuna tries learning rates, and ends trainings early that fall behind the others.
+"""Search for how to train (`pip install optuna`): it tries learning rates, and ends trainings that fall behind.
 
-Beyond springfoot's extra `train` it needs `pip install optuna`. Any function of a periodic evaluation looks on like
+Optuna is needed beyond springfoot's extra `train`. Any function of a periodic evaluation looks on like
 this: with wandb it is `lambda evaluation: wandb.log(evaluation, step=evaluation["timesteps"])`.
 """
 

@@ -21,6 +21,7 @@ from springfoot.envs.task.mirror import Mirror, mirror_of
 from springfoot.errors import SpringfootError, perhaps, quoted
 from springfoot.files.tensor_file import read_tensors, write_tensors
 
+from .baselines import BASELINES
 from .fingerprint import fingerprint, require_same
 from .foreign import ForeignPolicy, function_policy, is_function, observation_rows, onnx_policy
 from .number_bounds import LARGEST_WEIGHT, require_bounded
@@ -209,8 +210,13 @@ def load_policy(name: str | Path) -> Policy | ForeignPolicy:
     """Return the policy in a file, a run folder (its best), one of `SHIPPED`, or the function `module:function`.
 
     A .safetensors file is read by `read_policy`, an .onnx file by `onnx_policy`; neither executes anything. Only a
-    `name` of the form `module:function` runs code: `function_policy` imports that module.
+    `name` of the form `module:function` runs code: `function_policy` imports that module. Raises `SpringfootError` for
+    anything else, and for a baseline, which needs settings.
     """
+    if isinstance(name, str) and name.partition(":")[0] in BASELINES and not Path(name).exists():
+        raise SpringfootError(
+            f"{name} is a baseline, not a policy file: call springfoot.agents.baseline({name!r}, settings)"
+        )
     if isinstance(name, str) and is_function(name):
         return function_policy(name)
     path = find_policy(name)

@@ -279,3 +279,9 @@ def test_a_failed_write_leaves_the_old_file_alone(tmp_path):
         write_atomically(path, None)  # type: ignore[arg-type]
     assert path.read_bytes() == b"old"
     assert [item.name for item in tmp_path.iterdir()] == ["file"]
+
+
+@pytest.mark.parametrize("name", ["schedule", "constant:300,40"])
+def test_a_baseline_is_no_policy_file(name):
+    with pytest.raises(SpringfootError, match=r"is a baseline, not a policy file: call springfoot\.agents\.baseline\("):
+        load_policy(name)

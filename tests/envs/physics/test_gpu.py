@@ -23,5 +23,6 @@ def test_it_walks_as_c_mujoco_does(monkeypatch, capsys):
     pytest.importorskip("mujoco_warp", reason="needs the extra gpu")
     assert main(monkeypatch, "--device", "cpu", "--sizes", "3", "--steps", "1", "--repeats", "1") == 0
     told = capsys.readouterr().out
-    found = re.search(r"N = +3: [\d,]+ .* after 20 ms within (\S+) of C MuJoCo", told)
+    found = re.search(r"N = +3: [\d,]+ .* within (\S+) of C MuJoCo, forces of the floor within (\S+) of body", told)
     assert found and float(found.group(1)) < 1e-4
+    assert float(found.group(2)) < 1e-3
