@@ -215,6 +215,7 @@ def effort_of(plan: WalkPlan, muscle: Muscle = AS_IS) -> Effort:
     dynamics = inverse_dynamics(body, motion, load, plan.slope)
     moment = np.stack([dynamics.moment[joint] for joint in JOINTS], -1)
     angle, rate = (_segments_to_joints(turns) for turns in (motion.turn, motion.rate))
+    angle[:, JOINTS.index("hip")] += plan.slope  # turns are to the ground's normal, the hip's angle to the vertical
     return effort_of_stride(body, angle, rate, moment, plan.stride_time, 2 * plan.step_length, muscle)
 
 
@@ -271,7 +272,7 @@ def _with_neighbours(values: NDArray) -> NDArray:
 def _segments_to_joints(turns: NDArray) -> NDArray:
     """Return joint angles or rates (..., 4) of hip, knee, ankle, toe from those of segments (`LEG_SEGMENTS`).
 
-    Flexion and dorsiflexion are positive; the hip's is the thigh to the vertical.
+    Flexion and dorsiflexion are positive; the hip's is the thigh to the normal of the ground.
     """
     thigh, shank, foot, toe = np.moveaxis(turns, -1, 0)
     return np.stack([thigh, thigh - shank, foot - shank, toe - foot], -1)

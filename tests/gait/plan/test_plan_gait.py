@@ -12,7 +12,7 @@ from springfoot.errors import SpringfootError
 from springfoot.gait import Body, plan_walk, planned_moments
 from springfoot.gait.body.body import GRAVITY
 from springfoot.gait.body.tissue import passive_moments
-from springfoot.gait.plan.effort import MOTION_RANGE_DEG, Muscle, effort_of
+from springfoot.gait.plan.effort import EFFORT_SAMPLES, JOINTS, MOTION_RANGE_DEG, Muscle, effort_of, effort_of_stride
 from springfoot.gait.plan.plan_gait import gait_of
 from springfoot.gait.plan.walk_style import STYLES, least_work, style_from
 from springfoot.studies.searches.plan_tuning import CHOICES, PlanTuning, price, style_at, vector_of
@@ -44,6 +44,19 @@ def test_effort_is_the_same_for_froude_equal_bodies():
     own = effort_of(PLAN)
     # Strength scales with mass x height; the toe's tissue likewise.
     assert (other.work, other.activation) == pytest.approx((own.work, own.activation), rel=0.01)
+
+
+@pytest.mark.parametrize("slope", [-0.08, 0.0, 0.08])
+def test_tissue_is_stretched_by_the_hips_angle_to_the_vertical_on_slopes_too(slope):
+    plan = plan_walk(BODY, 1.2, slope=slope)
+    phase = np.arange(EFFORT_SAMPLES) / EFFORT_SAMPLES
+    angle = np.stack(list(plan.joint_angles(phase).values()), -1)
+    moment = np.stack([planned_moments(plan, phase)[joint] for joint in JOINTS], -1)
+    rate = np.gradient(np.pad(angle, ((3, 3), (0, 0)), "wrap"), plan.stride_time / EFFORT_SAMPLES, axis=0)[3:-3]
+    by_angles = effort_of_stride(BODY, angle, rate, moment, plan.stride_time, 2 * plan.step_length)
+    own = effort_of(plan)
+    assert own.activation == pytest.approx(by_angles.activation, rel=5e-4)
+    assert own.work == pytest.approx(by_angles.work, rel=3e-3)
 
 
 def test_effort_counts_energy_and_joints_beyond_their_range():
