@@ -98,9 +98,10 @@ class Learner:
         )
 
     def begin_with(self, policy: Policy) -> None:
-        """Continue from the network and the observations' statistics of `policy`, critic and exploration untrained.
+        """Copy the network and the observations' statistics of `policy`; critic and exploration stay as they are.
 
-        Raises `SpringfootError` if it has other layers, another activation or bounds than the actor has.
+        Raises `SpringfootError` if it has other layers, another activation or other bounds of its output and its
+        observations than the actor has.
         """
         layers, activation, output = actor_of(self.ppo.policy)
         shapes = [tuple(weight.shape) for weight, _ in layers]

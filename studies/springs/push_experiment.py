@@ -163,8 +163,8 @@ def identified(pushed: Samples, undisturbed: Samples | None = None, margin: floa
         )
         usual: Sequence[PhaseSpring | None] = [None] * len(by_pushes)
         if undisturbed is not None:
-            data = {name: getattr(undisturbed, name)[:, column] for name in data}
-            usual = identify(**data, phase=undisturbed.phase, bounds=BOUNDS, margin=margin)
+            unpushed = {name: getattr(undisturbed, name)[:, column] for name in data}
+            usual = identify(**unpushed, phase=undisturbed.phase, bounds=BOUNDS, margin=margin)
         mean_torque = np.abs(pushed.course[:, column])
         for spring, usual_spring in zip(by_pushes, usual, strict=True):
             inside = (pushed.phase >= spring.start + margin) & (pushed.phase < spring.end - margin)

@@ -111,9 +111,10 @@ def _values(walks: PairedWalks) -> dict[Key, NDArray]:
 
 
 def _link(x: NDArray, y: NDArray) -> tuple[float, float, float, float]:
-    """Return an entry of `Response.links`: the correlation over the cells of two quantities, (cells, seeds) each.
+    """Return r of two quantities (cells, seeds) over the cells, the ends of its interval, and p of scrambled cells.
 
-    Seeds that fall in any cell are left out; NaN if fewer than two are left.
+    A cell is a joint in a phase (`CELLS`); r is of the means over seeds. Seeds that fall in any cell are left out;
+    all four are NaN if fewer than two are left. It is an entry of `Response.links`.
     """
     complete = np.isfinite(x + y).all(0)
     x = x[:, complete]
