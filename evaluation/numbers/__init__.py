@@ -6,8 +6,8 @@ from springfoot.lazy import lazy_names
 
 if TYPE_CHECKING:
     from .criteria import HUMAN_LIKE, NO_FALLS, WALKS, Criterion, number_text, unmet, with_derived
-    from .effort import effort_numbers, mean_effort, stiffness_charge
     from .likeness import ANGLE_JOINTS, MOMENT_JOINTS, gait_numbers
+    from .measured_effort import effort_numbers, mean_effort, stiffness_charge
     from .metrics import MOMENT_CURVES, Gait, measure
     from .per_leg import asymmetry, leg_numbers
     from .series import foot_contacts, mean_speed, strides_within
@@ -57,13 +57,13 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
             "foot_contacts": "series",
             "gait_numbers": "likeness",
             "leg_numbers": "per_leg",
-            "effort_numbers": "effort",
-            "mean_effort": "effort",
+            "effort_numbers": "measured_effort",
+            "mean_effort": "measured_effort",
             "mean_speed": "series",
             "measure": "metrics",
             "number_text": "criteria",
             "with_derived": "criteria",
-            "stiffness_charge": "effort",
+            "stiffness_charge": "measured_effort",
             "strides_within": "series",
             "unmet": "criteria",
         },

@@ -23,8 +23,8 @@ from springfoot.gait.plan.effort import AS_IS, Muscle
 from ..recording.open_loop import feedback
 from ..recording.recording import REWARD, TICK, Recording
 from .curves import StrideCurves
-from .effort import cost_of_transport, effort_numbers
 from .likeness import angle_numbers, force_numbers, moment_numbers
+from .measured_effort import cost_of_transport, effort_numbers
 from .per_leg import ANGLE_COLUMNS, USUAL_TOE_OFF, asymmetry, feet_differ, kinds_of, leg_numbers
 from .tally import StrideTally, tally_strides
 

@@ -21,7 +21,7 @@ from springfoot.gait.plan.effort import AS_IS, Muscle
 
 from ..recording.recording import REWARD, TICK, WARM_UP, Recording
 from .curves import StrideCurves
-from .effort import EpisodeEffort, episode_effort
+from .measured_effort import EpisodeEffort, episode_effort
 from .series import (
     GAIT_CYCLE_COLUMNS,
     distance_walked,

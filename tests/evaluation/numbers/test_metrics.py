@@ -9,7 +9,7 @@ from springfoot.envs.physics.contact import BALL_RADIUS, HEEL_RADIUS, TOE_RADIUS
 from springfoot.envs.physics.energy import ledger_entries
 from springfoot.envs.settings.settings import BipedSettings
 from springfoot.envs.task.reward import TERMS
-from springfoot.evaluation.numbers.effort import cost_of_transport
+from springfoot.evaluation.numbers.measured_effort import cost_of_transport
 from springfoot.evaluation.numbers.metrics import measure
 from springfoot.evaluation.numbers.series import GAIT_CYCLE_COLUMNS
 from springfoot.evaluation.numbers.tally import tally_strides
