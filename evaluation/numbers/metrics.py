@@ -20,7 +20,7 @@ from springfoot.gait.people import scores as score
 from springfoot.gait.people.gait_events import PERCENT
 from springfoot.gait.plan.effort import AS_IS, Muscle
 
-from ..recording.open_loop import feedback
+from ..recording.open_loop import alike_legs, feedback
 from ..recording.recording import REWARD, TICK, Recording
 from .curves import StrideCurves
 from .likeness import angle_numbers, force_numbers, moment_numbers
@@ -81,7 +81,9 @@ def _metrics(recording: Recording, tally: StrideTally) -> dict[str, Any]:
     toe_off = _mean(tally.toe_off)
     plan_x, plan_z = recording.plan_com.T
     com_z = tally.com.mean("z")
-    legs = leg_numbers(tally) if feet_differ(settings) else None
+    of_each_leg = leg_numbers(tally)
+    legs = of_each_leg if feet_differ(settings) else None
+    unlike = legs is None and len(alike_legs(recording)) > 1
 
     def stiffness(name: str) -> dict[str, Any]:
         """Return the entry `name`, ankle or toe, of `stiffness_Nm_rad`: mean K of both legs in each part of the stride.
@@ -137,6 +139,7 @@ def _metrics(recording: Recording, tally: StrideTally) -> dict[str, Any]:
         "zmp": _zmp(recording.plan_zmp, tally),
         "cost_of_transport": cost_of_transport(tally.work, body_of(settings).mass, tally.distance),
         "stiffness_Nm_rad": {name: stiffness(name) for name in ("ankle", "toe")},
+        "leg_stiffness_Nm_rad": {side: of_each_leg[side]["stiffness_Nm_rad"] for side in SIDES} if unlike else None,
         "feedback": feedback(recording),
         "per_leg": legs,
         "asymmetry": None if legs is None else asymmetry(legs),

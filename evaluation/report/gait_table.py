@@ -397,10 +397,18 @@ def _sections(metrics: dict[str, Any]) -> list[list[TableRow]]:
         """Return a fraction as text of its percent."""
         return text_of(None if value is None else 100 * value, ".0f")
 
-    def stiffness(joint: str, values: dict[str, float | None]) -> str:
-        """Return the stiffness of a joint in the parts of the stride as text."""
+    def stiffness(joint: str) -> list[TableRow]:
+        """Return the rows of the stiffness of a joint in the parts of the stride: of each leg if they are not alike."""
         locked = all(getattr(foot, joint).is_locked for foot in settings.feet)
-        return LOCKED if locked else "/".join(text_of(value, ".0f") for value in values.values())
+        by_label = {"": metrics["stiffness_Nm_rad"]}
+        if metrics["leg_stiffness_Nm_rad"] is not None:
+            by_label = {f", {side}": values for side, values in metrics["leg_stiffness_Nm_rad"].items()}
+        texts = {
+            end: "/".join(text_of(value, ".0f") for value in values[joint].values()) for end, values in by_label.items()
+        }
+        return [
+            TableRow(f"{joint} stiffness{end}", "N·m/rad", LOCKED if locked else text) for end, text in texts.items()
+        ]
 
     def mm(label: str, value: float | None, r: float | None = None) -> TableRow:
         """Return the row of a length [m], in millimetres."""
@@ -459,10 +467,7 @@ def _sections(metrics: dict[str, Any]) -> list[list[TableRow]]:
             mm("toe clearance", metrics["toe_clearance_m"]),
             mm("sole's slide a stance", metrics["contact_travel_m"]),
         ],
-        [
-            TableRow(f"{name} stiffness", "N·m/rad", stiffness(name, values))
-            for name, values in metrics["stiffness_Nm_rad"].items()
-        ]
+        [*stiffness("ankle"), *stiffness("toe")]
         + [
             TableRow(f"{name} feedback", "%", "/".join(percent(values[key]) for key in ("share", "spread")))
             for name, values in metrics["feedback"].items()

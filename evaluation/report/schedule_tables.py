@@ -33,7 +33,7 @@ STATES = ("loading", "early mid-stance", "late mid-stance", "early push-off", "l
 def write_schedules(folder: Path, recording: Recording) -> None:
     """Write `stiffness_schedule.csv` and, unless both feet have a device, `finite_states.json`.
 
-    Where both legs decide and are not alike (`alike_legs`), each has its own, `finite_states_left.json` and `_right`.
+    Where legs are not alike (`alike_legs`), each that decides has its own, `finite_states_left.json` or `_right`.
     """
     settings = recording.settings
     body = body_of(recording.settings)
@@ -42,7 +42,7 @@ def write_schedules(folder: Path, recording: Recording) -> None:
     groups = alike_legs(recording) if deciding_legs(settings) else []
     for legs in groups:
         table = states_json(finite_states(recording, legs))
-        end = f"_{SIDES[legs[0]]}" if len(groups) > 1 else ""
+        end = f"_{SIDES[legs[0]]}" if len(legs) == 1 else ""
         (folder / f"finite_states{end}.json").write_text(table, encoding="utf-8")
 
 

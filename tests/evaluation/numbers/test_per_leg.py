@@ -174,6 +174,24 @@ def test_without_a_leg_that_decides_there_is_no_table_of_finite_states(recording
     assert [path.name for path in tmp_path.iterdir()] == ["stiffness_schedule.csv"]
 
 
+def test_the_table_has_a_row_for_each_of_two_legs_of_unlike_stiffness(recordings):
+    recording = recordings[2]
+    stiffness = np.ones_like(recording.series["stiffness"]) * [[200.0, 30.0], [200.0, 200.0]]
+    unlike = measure(with_stiffness(recording, stiffness)).metrics
+    rows = printed(unlike)
+    assert "toe stiffness, left N·m/rad 30/30/30/30" in rows and "toe stiffness, right N·m/rad 200/200/200/200" in rows
+    assert not any("115/" in row for row in rows)  # which no leg has
+    alike = measure(recording).metrics
+    assert alike["leg_stiffness_Nm_rad"] is None and any(
+        row.startswith("toe stiffness N·m/rad") for row in printed(alike)
+    )
+
+
+def test_states_of_one_leg_are_named_after_it(recordings, tmp_path):
+    write_schedules(tmp_path, recordings[0])
+    assert [path.name for path in tmp_path.glob("*.json")] == ["finite_states_left.json"]
+
+
 @pytest.mark.parametrize("foot", ["intact", "weak"])
 def test_legs_with_different_feet_or_stiffness_have_states_and_feedback_of_their_own(recordings, tmp_path, foot):
     recording = recordings[2]
