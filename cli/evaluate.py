@@ -68,7 +68,7 @@ def evaluate_main(arguments: Sequence[str] | None = None, program: str = "evalua
     `arguments` are those of the process unless given; `program` is the name in messages.
     """
     words = list(sys.argv[1:] if arguments is None else arguments)
-    flags = parse(EvaluateFlags, words, program)
+    flags = parse(EvaluateFlags, words, program, synonyms={"--episode-seconds": "--seconds"})
     return exit_code(program, lambda: run_evaluation(flags, program, printable(shlex.join([*program.split(), *words]))))
 
 

@@ -11,7 +11,7 @@ import sys
 import textwrap
 import threading
 from collections import Counter
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import redirect_stderr
 from difflib import SequenceMatcher
 from itertools import pairwise
@@ -40,13 +40,17 @@ _REWORDED = {
 
 
 def parse(
-    flags: type[Flags], words: Sequence[str] | None, program: str, repeatable: Collection[str] = frozenset()
+    flags: type[Flags],
+    words: Sequence[str] | None,
+    program: str,
+    repeatable: Collection[str] = frozenset(),
+    synonyms: Mapping[str, str] = MappingProxyType({}),
 ) -> Flags:
     """Return the flags of a command line as the dataclass `flags`; `--help` exits with 0.
 
     The command line is `words`, or with None that of the process. `program` is the command's name in messages. A bad
     flag, and one that is given twice unless it is `repeatable`, exits with 2 after one line on standard error that
-    names the flag and its fault.
+    names the flag and its fault. `synonyms` are flags that mean the same as others: a line has one of the two.
     """
     words = list(sys.argv[1:] if words is None else words)
     _join_help_lines(flags)
@@ -58,7 +62,7 @@ def parse(
         if end.code == 2:
             print(f"{program}: error: {_one_line(_message_in_box(output.getvalue()))}", file=sys.stderr)
         raise
-    if repeated := _repeated_flag(words, repeatable):
+    if repeated := _repeated_flag(words, repeatable, synonyms):
         print(f"{program}: error: {repeated} is given twice; give it once", file=sys.stderr)
         raise SystemExit(2)
     return parsed
@@ -88,12 +92,13 @@ def _join_help_lines(flags: type) -> None:
             item.metadata = MappingProxyType({**item.metadata, "help": help_of[item.name]})  # tyro's name for it
 
 
-def _repeated_flag(words: Sequence[str], repeatable: Collection[str]) -> str:
+def _repeated_flag(words: Sequence[str], repeatable: Collection[str], synonyms: Mapping[str, str]) -> str:
     """Return the first flag that stands twice among the words and may not, "" if none does; tyro would take the last
     silently."""
     # --name=value and --name, with - or _ for the parts of the name.
     flags = [word.partition("=")[0].replace("_", "-") for word in words if word.startswith("--")]
-    return next((flag for flag, count in Counter(flags).items() if count > 1 and flag not in repeatable), "")
+    counts = Counter(synonyms.get(flag, flag) for flag in flags)
+    return next((flag for flag, count in counts.items() if count > 1 and flag not in repeatable), "")
 
 
 def _message_in_box(text: str) -> str:

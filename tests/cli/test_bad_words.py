@@ -49,6 +49,7 @@ EVALUATE = [
     (["--out"], "--out needs a value"),
     (["-z"], "unrecognized options: -z"),
     (["--right-foot", "rigid", "--right-foot", "passive"], "--right-foot is given twice; give it once"),
+    (["--seconds", "4", "--episode_seconds=6"], "--seconds is given twice; give it once"),
     (["--right_foot=rigid", "--speed", "1", "--right-foot", "rigid"], "--right-foot is given twice; give it once"),
 ]
 TRAIN = [
