@@ -185,8 +185,8 @@ def find_policy(name: str | Path) -> Path:
         path /= BEST
     elif not path.is_file():
         raise SpringfootError(
-            f"no policy {name}: give a .safetensors or .onnx file, a run folder, module:function or 'pretrained'"
-            f"{perhaps_policy(str(name), SHIPPED)}"
+            f"no policy {name}: give a .safetensors or .onnx file, a run folder, module:function, or one of "
+            f"{', '.join(SHIPPED)}{perhaps_policy(str(name), SHIPPED)}"
         )
     return path
 

@@ -76,7 +76,7 @@ CASES = [
     (["evaluate", "pretraind"], f"springfoot evaluate: error: no policy 'pretraind': {POLICIES}; perhaps pretrained?"),
     (["live", "schedul:1.2"], f"springfoot live: error: no policy 'schedul:1.2': {POLICIES}; perhaps schedule?"),
     (["evaluate", "zzz"], f"springfoot evaluate: error: no policy 'zzz': {POLICIES}"),
-    (["export", "predictd", "--out", "new.onnx"], "springfoot export: error: no policy predictd: give a .safetensors or .onnx file, a run folder, module:function or 'pretrained'; perhaps predicted?"),
+    (["export", "predictd", "--out", "new.onnx"], "springfoot export: error: no policy predictd: give a .safetensors or .onnx file, a run folder, module:function, or one of pretrained, medium, predicted, learned, learned-2; perhaps predicted?"),
     (["study", "compare", "schedule", "--epochs", "3"], "springfoot study compare: error: unrecognized options: --epochs, 3"),
 ]
 # fmt: on

@@ -14,10 +14,12 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from springfoot.agents import load_policy
+from springfoot.agents import load_policy, train
 from springfoot.agents.training.config import PRESETS, TrainingConfig
+from springfoot.agents.training.returns import evaluate_returns
 from springfoot.agents.training.run_record import is_of_rllib, read_record
 from springfoot.cli.train import train_main
+from springfoot.envs import Biped
 from springfoot.envs.settings.settings import BipedSettings
 from springfoot.envs.vector_env import SegmentedFootBipedVector
 from springfoot.errors import SpringfootError
@@ -83,6 +85,19 @@ def test_the_first_policy_is_the_mean_action_of_the_untrained_network(tmp_path):
         hidden = hidden if index == len(layers) - 1 else np.tanh(hidden)
     assert theirs[:, :4].numpy() == pytest.approx(hidden, abs=1e-5)
     assert theirs[:, 4:].numpy() == pytest.approx(-0.9)
+
+
+def test_two_nodes_learn_as_much_as_our_own_trainer_of_as_many_samples(cluster, tmp_path):
+    """Of 500,000 pushed steps: at least .95 of its return, mean of 20 other episodes, and no fall."""
+    config = dataclasses.replace(PRESETS["walk"], timesteps=500_000)
+    train(config, tmp_path / "ours")
+    rllib_training.train(config, tmp_path / "rllib", num_env_runners=2)
+    biped = Biped(config.environment, 20, 2)
+    ours, _, _ = evaluate_returns(biped, load_policy(tmp_path / "ours"), 0)
+    theirs, _, fell = evaluate_returns(biped, load_policy(tmp_path / "rllib"), 0)
+    print(f"our own {ours.mean():.1f}, RLlib {theirs.mean():.1f} with {fell.sum()} of 20 falls")
+    assert theirs.mean() >= 0.95 * ours.mean()
+    assert not fell.any()
 
 
 def test_a_killed_node_and_its_runner_are_replaced(cluster, tmp_path):
