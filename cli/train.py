@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 import tyro
 
-from springfoot.agents.training.config import PRESETS, TrainingConfig, require_not_mirrored
+from springfoot.agents.training.config import PRESETS, TrainingConfig, require_of_rllib
 from springfoot.command_line import end_in_order, exit_code, parse, stopped_by
 from springfoot.envs.settings.settings import CONDITION_SETTINGS, BipedSettings, settings_from, settings_to_json
 from springfoot.errors import MOST_THREADS, SpringfootError, require_count
@@ -20,7 +20,7 @@ from springfoot.studies.base.flags import given, optional_flags
 PRESET = PRESETS["walk"]
 """Preset whose values the help shows as defaults."""
 ENGINES = Literal["sb3", "rllib"]
-RESUMED = {"timesteps", "threads", "reward_weights"}
+RESUMED = {"timesteps", "threads", "device", "reward_weights"}
 """Settings that may change when a run is continued."""
 TrainingFlags = optional_flags("TrainingFlags", TrainingConfig, PRESET, leave_out=("environment",))
 FOLDER = tyro.conf.arg(metavar="FOLDER", help_behavior_hint="")
@@ -39,7 +39,7 @@ class TrainFlags:
     """New folder for the run."""
     resume: Annotated[Path | None, FOLDER] = None
     """Folder of a run to continue, with its saved settings, bit for bit as if nothing had interrupted it. --timesteps
-    then counts further steps; --threads and --reward-weights may be changed."""
+    then counts further steps; --threads, --device and --reward-weights may be changed."""
     begin_from: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER|POLICY", help_behavior_hint="")] = None
     """Folder of a run, or a policy (`learned`, a file), whose network the training begins with, in place of an
     untrained one, as to adapt a person to one foot; the task may be another, observations and actions not."""
@@ -154,7 +154,7 @@ def _train(flags: TrainFlags, config: TrainingConfig) -> dict[str, Any]:
     """Train a new run of `config` with the engine of the flags; return the content of its run.json."""
     assert flags.out is not None
     if flags.engine == "rllib":
-        require_not_mirrored(config)
+        require_of_rllib(config)
         return _engine(rllib=True).train(config, flags.out, flags.num_env_runners)
     return _engine(rllib=False).train(config, flags.out, begin_from=flags.begin_from)
 
@@ -171,6 +171,8 @@ def _resume(flags: TrainFlags, settings: dict[str, Any]) -> dict[str, Any]:
     if (flags.resume / RUN).is_file() and is_of_rllib(read_record(flags.resume)):
         if "reward_weights" in settings:
             raise SpringfootError("--resume of a run of RLlib goes on with its reward; drop --reward-weights")
+        if "device" in settings:
+            raise SpringfootError("--resume of a run of RLlib learns on the CPU; drop --device")
         return _engine(rllib=True).resume(flags.resume, num_env_runners=flags.num_env_runners, **settings)
     if flags.num_env_runners is not None or flags.engine != "sb3":
         raise SpringfootError(f"{flags.resume} is no run of RLlib; drop --engine and --num-env-runners")

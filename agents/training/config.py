@@ -5,7 +5,7 @@ import os
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from numbers import Integral
-from typing import Any
+from typing import Any, Literal, get_args
 
 from springfoot.envs.settings.checks import MOST_ENVIRONMENTS, refusing_unknown
 from springfoot.envs.settings.settings import BipedSettings, settings_from, settings_to_json
@@ -18,6 +18,8 @@ _LARGEST = 1e3  # rate of learning or clip range; chosen
 _SIDE_BY_SIDE = ("num_envs", "eval_episodes")
 """Settings that count environments simulated side by side, and so have their limit."""
 
+Device = Literal["cpu", "cuda"]
+DEVICES = get_args(Device)
 TRAINED_ON = BipedSettings(episode_seconds=10.0, push_newton=150.0)
 """Default task: pushes of 150 N, and an action that sets the stiffness itself, mid-range at 0."""
 
@@ -35,6 +37,8 @@ class TrainingConfig:
     """Environments stepped together in one batch."""
     threads: int = 0
     """Threads of the physics, 0 for one per available processor; results are the same with any number."""
+    device: Device = "cpu"
+    """Processor of the network: `cuda` is a GPU, which is faster for many environments and has other last bits."""
     update_steps: int = 8192
     """Environment steps collected for each update of the policy, all environments together."""
     minibatches: int = 8
@@ -70,6 +74,8 @@ class TrainingConfig:
             require_count(name, getattr(self, name), 1, MOST_ENVIRONMENTS if name in _SIDE_BY_SIDE else MOST_COUNT)
         require_count("seed", self.seed, 0, 2**31 - 1)
         require_count("threads", self.threads, 0, MOST_THREADS)
+        if self.device not in DEVICES:
+            raise SpringfootError(f"device must be {' or '.join(DEVICES)}, got {quoted(self.device)}")
         # A step of each environment, and two samples in a minibatch: advantages are divided by their deviation in it.
         require_count("update_steps", self.update_steps, max(self.num_envs, 2 * self.minibatches))
         for name in ("learning_rate", "clip_range"):
@@ -243,10 +249,12 @@ def config_from_json(values: dict[str, Any]) -> TrainingConfig:
     return TrainingConfig(**plain)
 
 
-def require_not_mirrored(config: TrainingConfig) -> None:
-    """Raise `SpringfootError` for a mirrored network, which RLlib does not train."""
+def require_of_rllib(config: TrainingConfig) -> None:
+    """Raise `SpringfootError` for a mirrored network and for a GPU, on which RLlib does not train here."""
     if config.mirrored:
         raise SpringfootError("--engine rllib trains no mirrored network: give --mirrored False, or another engine")
+    if config.device != "cpu":
+        raise SpringfootError(f"--engine rllib learns on the CPU; drop --device {config.device}, or --engine")
 
 
 def processors() -> int:

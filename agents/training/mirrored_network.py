@@ -26,6 +26,8 @@ class MirroredNetwork(ActorCriticPolicy):
     `ActorCriticPolicy`.
     """
 
+    _legs_order: torch.Tensor
+
     def __init__(self, *arguments: Any, mirror: Mirror, **keywords: Any) -> None:
         self.mirror = mirror  # before the layers, which are built in there
         super().__init__(*arguments, **keywords)
@@ -33,7 +35,7 @@ class MirroredNetwork(ActorCriticPolicy):
     def _build(self, lr_schedule: Schedule) -> None:
         """Create network and optimizer: action layer and log std have the width of one leg's actions."""
         self.action_dist = DiagGaussianDistribution(len(self.mirror.action_index) // 2)
-        self._legs_order = torch.from_numpy(self.mirror.legs_order)
+        self.register_buffer("_legs_order", torch.from_numpy(self.mirror.legs_order), persistent=False)
         super()._build(lr_schedule)
 
     def _build_mlp_extractor(self) -> None:
@@ -59,10 +61,13 @@ class MirroredNetwork(ActorCriticPolicy):
 class _BothImages(MlpExtractor):
     """Hidden layers of actor and critic, on an observation and on its mirror image."""
 
+    _index: torch.Tensor
+    _sign: torch.Tensor
+
     def __init__(self, *arguments: Any, mirror: Mirror, **keywords: Any) -> None:
         super().__init__(*arguments, **keywords)
-        self._index = torch.from_numpy(mirror.index)
-        self._sign = torch.from_numpy(mirror.sign.astype(np.float32))
+        self.register_buffer("_index", torch.from_numpy(mirror.index), persistent=False)
+        self.register_buffer("_sign", torch.from_numpy(mirror.sign.astype(np.float32)), persistent=False)
 
     def forward_actor(self, features: torch.Tensor) -> torch.Tensor:
         """Return the actor's last hidden layer, of H units, for observations (N, D) and their images: (N, 2, H)."""

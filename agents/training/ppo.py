@@ -32,12 +32,16 @@ say; chosen."""
 class Learner:
     """An untrained actor and critic on a batch of environments, with stable-baselines3's PPO to train them.
 
+    Raises `SpringfootError` for a GPU that torch does not find.
+
     Weights are orthogonal, biases zero; with gain 0.01 on the action layer the mean action begins near 0. Observations
     and rewards are normalised by their running statistics. With `mirrored` network and statistics are those of
     `mirrored_network`.
     """
 
     def __init__(self, config: TrainingConfig, environments: VecEnv, seed: int) -> None:
+        if config.device == "cuda" and not torch.cuda.is_available():
+            raise SpringfootError("device cuda needs a GPU that torch finds; there is none, give cpu")
         torch.set_num_threads(1)  # more compete with the threads of the physics, and are up to 200 times slower
         self._environment = config.environment
         steps_of_20ms = config.environment.step_seconds / ACTION_STEP  # gamma and lambda are per 20 ms
@@ -73,7 +77,7 @@ class Learner:
                     **network,
                 },
                 seed=seed,
-                device="cpu",
+                device=config.device,
             )
 
     def policy(self, fingerprint: dict[str, str]) -> Policy:
@@ -88,8 +92,8 @@ class Learner:
             Policy(
                 settings=self._environment,
                 fingerprint=fingerprint,
-                weights=tuple(weight.detach().numpy().copy() for weight, _ in layers),
-                biases=tuple(bias.detach().numpy().copy() for _, bias in layers),
+                weights=tuple(weight.detach().cpu().numpy().copy() for weight, _ in layers),
+                biases=tuple(bias.detach().cpu().numpy().copy() for _, bias in layers),
                 observation_mean=of_observations.mean.copy(),
                 observation_variance=of_observations.var,
                 observation_clip=self.normalized.clip_obs,
@@ -129,7 +133,7 @@ class Learner:
         tensors = {f"network.{name}": value for name, value in self.ppo.policy.state_dict().items()}
         for index, moments in self.ppo.policy.optimizer.state_dict()["state"].items():
             tensors |= {f"adam.{index}.{name}": value for name, value in moments.items()}
-        arrays = {name: value.detach().numpy().copy() for name, value in tensors.items()}
+        arrays = {name: value.detach().cpu().numpy().copy() for name, value in tensors.items()}
         for name, statistics in self._statistics().items():
             for item in ("mean", "var", "count"):
                 arrays[f"{name}.{item}"] = np.array(getattr(statistics, item), dtype=np.float64)

@@ -20,7 +20,7 @@ from springfoot.files.writing import remove_temporary, require_new
 from ..policies.policy import BEST, LAST, RUN, SHIPPED, Policy, read_policy
 from .callbacks import UserCallback
 from .checkpoint import Checkpoint, newest_checkpoint
-from .config import TrainingConfig, config_from_json, config_to_json
+from .config import Device, TrainingConfig, config_from_json, config_to_json
 from .run_record import is_of_rllib, read_record, runs_within
 from .session import BEST_FILE, Session
 
@@ -68,6 +68,7 @@ def resume(
     threads: int | None = None,
     callbacks: Sequence[UserCallback] = (),
     reward_weights: Mapping[str, float] | None = None,
+    device: Device | None = None,
 ) -> dict[str, Any]:
     """Continue the run in `out` with its saved settings; return the content of `run.json`.
 
@@ -79,11 +80,12 @@ def resume(
         callbacks: as for `train`; their state is not part of the checkpoint.
         reward_weights: weights of the reward from here on, in place of the saved ones of the same names. The best
             policy is measured anew by them, and the session in `run.json` keeps the saved ones as `changed_from`.
+        device: processor of the network from here on, in place of the saved one.
 
     Starts from the newest whole checkpoint, and ends with the bits of an uninterrupted run, on the same versions and a
-    processor of the same instructions. Completes whatever an earlier end left unfinished in the folder. Raises
-    `SpringfootError` for a folder without a run, and for a run that is finished, that another process writes, or that
-    this version cannot continue.
+    processor of the same instructions; not on a GPU, whose random numbers begin anew. Completes whatever an earlier end
+    left unfinished in the folder. Raises `SpringfootError` for a folder without a run, and for a run that is finished,
+    that another process writes, or that this version cannot continue.
     """
     out = Path(out)
     if not (out / RUN).is_file():
@@ -112,7 +114,7 @@ def resume(
             raise SpringfootError(f"{out} has done its {done:,} timesteps; timesteps must say how many more to train")
         if checkpoint:
             _require_same_shape(out, header["config"], config_to_json(config))
-        config = dataclasses.replace(config, timesteps=total)
+        config = dataclasses.replace(config, timesteps=total, device=device or config.device)
         return Session(config, out, header["record"], checkpoint, threads, callbacks).learn()
 
 

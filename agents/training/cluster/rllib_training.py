@@ -38,7 +38,7 @@ from springfoot.files.locks import owned
 from springfoot.files.provenance import versions_and_commit
 from springfoot.files.writing import remove_temporary, require_new, write_atomically
 
-from ..config import TrainingConfig, config_from_json, config_to_json, processors, require_not_mirrored
+from ..config import TrainingConfig, config_from_json, config_to_json, processors, require_of_rllib
 from ..progress import Progress
 from ..returns import evaluation_of
 from ..run_record import RLLIB, best_of, is_of_rllib, read_record, require_past, write_record
@@ -157,7 +157,7 @@ class _Run:
         num_env_runners: int | None,
         checkpoint: Path | None = None,
     ) -> None:
-        require_not_mirrored(config)
+        require_of_rllib(config)
         threads = config.threads or processors()
         self._evaluation = Biped(config.environment, config.eval_episodes, threads)  # first: raises for bad settings
         self._fingerprint = fingerprint(self._evaluation)
