@@ -181,7 +181,7 @@ check: install build/typing/made
 
 docs: install build/typing/made $(VENV)/docs
 	$(BIN)/python docs/generate.py
-	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build
 
 $(VENV)/docs: pyproject.toml constraints.txt | $(VENV)/installed
 	$(BIN)/pip install --disable-pip-version-check --constraint constraints.txt --editable ".[docs]"

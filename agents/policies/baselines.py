@@ -152,11 +152,14 @@ SWINGS = {"thesis": THESIS_SWING, "thesis_printed": PRINTED_SWING}
 def baseline(name: str, settings: BipedSettings, seed: int = 0) -> PolicyFunction:
     """Return the policy of a baseline for the environment of `settings`; `seed` is that of `random`.
 
-    `name` is one of `BASELINES`, or `constant:ANKLE,TOE` or `schedule:FACTOR`. Raises `SpringfootError` for any other.
+    `name` is one of `BASELINES`, or `constant:ANKLE,TOE` or `schedule:FACTOR`. Raises `SpringfootError` for any other,
+    and for settings in which a policy acts on more than stiffness.
     """
     kind, colon, numbers = name.partition(":")
     if kind not in BASELINES:
         raise SpringfootError(f"no baseline {name!r}; there are {', '.join(BASELINES)}")
+    if settings.acts != "stiffness":
+        raise SpringfootError(f"baselines set stiffness alone: acts must be stiffness for {name}, got {settings.acts}")
     if colon and kind not in ("constant", "schedule"):
         raise SpringfootError(f"only constant and schedule take numbers, as in constant:300,40, got {name!r}")
     match kind:

@@ -13,7 +13,7 @@ from ..settings.settings import BipedSettings
 from .phase_table import GRID
 
 
-def gait_events(target: HumanGait) -> NDArray:
+def planned_events(target: HumanGait) -> NDArray:
     """Return (4,) stride phases of the target's heel strike, foot flat, heel-off and toe-off, from its angle curves."""
     ankle = ankle_events(GRID, target.mean("ankle", GRID), target.toe_off)
     toe = toe_events(GRID, target.mean("toe", GRID), target.toe_off)
@@ -72,7 +72,7 @@ class DecisionTimes:
     """
 
     def __init__(self, settings: BipedSettings, target: HumanGait, rows: NDArray):
-        self._events = gait_events(target) if settings.decisions == "event" else np.empty(0)
+        self._events = planned_events(target) if settings.decisions == "event" else np.empty(0)
         self._rows = rows
         self._decisions = rows["decision"]
         self.action = self._decisions["action"]

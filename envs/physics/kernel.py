@@ -131,7 +131,7 @@ def _text_of(value: Any) -> str:
     if isinstance(value, Dispatcher):
         return value.py_func.__qualname__  # with its own fingerprint
     if isinstance(value, np.ndarray):
-        return f"{value.dtype} {value.tobytes().hex()}"
+        return f"{value.dtype} {value.shape} {value.tobytes().hex()}"
     if isinstance(value, type) and hasattr(value, "_fields"):
         return f"{value.__name__}{value._fields}"  # of a named tuple
     return getattr(value, "__name__", None) or repr(value)  # of modules and functions; of numbers and types of records

@@ -6,16 +6,18 @@ from springfoot.lazy import lazy_names
 
 if TYPE_CHECKING:
     from .criteria import HUMAN_LIKE, NO_FALLS, WALKS, Criterion, number_text, unmet, with_derived
-    from .likeness import ANGLE_JOINTS, MOMENT_JOINTS, gait_numbers
+    from .likeness import ANGLE_JOINTS, LATE_SWING_PERCENT, MOMENT_JOINTS, gait_numbers
     from .measured_effort import effort_numbers, mean_effort, stiffness_charge
     from .metrics import MOMENT_CURVES, Gait, measure
     from .per_leg import asymmetry, leg_numbers
+    from .planned_task import effort_and_impact
     from .series import foot_contacts, mean_speed, strides_within
     from .tally import StrideTally, add_episode
 
 __all__ = [
     "ANGLE_JOINTS",
     "HUMAN_LIKE",
+    "LATE_SWING_PERCENT",
     "MOMENT_CURVES",
     "MOMENT_JOINTS",
     "NO_FALLS",
@@ -25,6 +27,7 @@ __all__ = [
     "StrideTally",
     "add_episode",
     "asymmetry",
+    "effort_and_impact",
     "effort_numbers",
     "foot_contacts",
     "gait_numbers",
@@ -45,6 +48,7 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
         {
             "ANGLE_JOINTS": "likeness",
             "HUMAN_LIKE": "criteria",
+            "LATE_SWING_PERCENT": "likeness",
             "MOMENT_JOINTS": "likeness",
             "MOMENT_CURVES": "metrics",
             "NO_FALLS": "criteria",
@@ -54,6 +58,7 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
             "StrideTally": "tally",
             "add_episode": "tally",
             "asymmetry": "per_leg",
+            "effort_and_impact": "planned_task",
             "foot_contacts": "series",
             "gait_numbers": "likeness",
             "leg_numbers": "per_leg",

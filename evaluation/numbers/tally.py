@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from springfoot.arrays import NDArray
-from springfoot.envs.control.standing import steady_walk
 from springfoot.envs.physics.contact import CONTACTS
 from springfoot.envs.physics.energy import ledger_entries
 from springfoot.envs.physics.model import SIDES, contact_material
@@ -19,7 +18,7 @@ from springfoot.gait.people import scores as score
 from springfoot.gait.people.gait_events import CONTACT_THRESHOLD_BW, Contacts, find_steps, next_after, on_percent
 from springfoot.gait.plan.effort import AS_IS, Muscle
 
-from ..recording.recording import REWARD, TICK, WARM_UP, Recording
+from ..recording.recording import REWARD, TICK, Recording
 from .curves import StrideCurves
 from .measured_effort import EpisodeEffort, episode_effort
 from .series import (
@@ -104,11 +103,10 @@ def tally_strides(recording: Recording, muscle: Muscle = AS_IS) -> StrideTally:
     """
     tally = StrideTally()
     fell = recording.fall_reason != ""
-    begin, end = steady_walk(recording.settings)
     for episode, ticks in enumerate(recording.ticks):
-        series = {name: values[episode, :ticks].astype(float) for name, values in recording.series.items()}
         if ticks:
-            add_episode(tally, series, recording.settings, (begin + WARM_UP, end), bool(fell[episode]), muscle)
+            series = recording.episode(episode)
+            add_episode(tally, series, recording.settings, recording.measured_span, bool(fell[episode]), muscle)
             tally.at_rest += not fell[episode] and score.at_rest(
                 series["com"], *series["ankle"].swapaxes(0, 1), tick=TICK
             )

@@ -23,7 +23,7 @@ from springfoot.gait.people.gait_events import PERCENT, sample
 from ..numbers.metrics import MOMENT_CURVES, Gait, measure
 from ..numbers.per_leg import ANGLE_COLUMNS
 from ..numbers.series import foot_contacts, strides_within
-from ..recording.recording import TICK, WARM_UP, Recording
+from ..recording.recording import TICK, Recording
 from .page_figure import figure_data, planned_zmp, shown_numbers
 from .template import as_json, filled
 
@@ -146,10 +146,9 @@ def mean_stride(walk: Walk) -> tuple[dict[str, Any], NDArray] | None:
     strides: list[NDArray] = []
     durations: list[float] = []
     for episode in np.flatnonzero(recording.fall_reason == ""):
-        ticks = recording.ticks[episode]
-        series = {name: values[episode, :ticks].astype(float) for name, values in recording.series.items()}
+        series = recording.episode(int(episode))
         left, _ = foot_contacts(series["force"][..., 1].sum(axis=2), body)
-        begin, _, end = strides_within(left, (WARM_UP, np.inf)).T
+        begin, _, end = strides_within(left, recording.measured_span).T
         drawn = _figure_series(recording, series, body)
         times = begin[:, None] + (end - begin)[:, None] * np.linspace(0, 1, MOMENTS)
         strides.extend(sample(drawn, times, TICK, TICK))  # (MOMENTS, column) each; column 0 is the hip's x

@@ -14,7 +14,6 @@ from springfoot.agents.policies.baselines import PolicyFunction, follow
 from springfoot.arrays import NDArray
 from springfoot.envs.control.phase_table import GRID
 from springfoot.envs.control.reference_walk import tabulated_speeds
-from springfoot.envs.control.standing import steady_walk
 from springfoot.envs.physics.model import LEFT, RIGHT, SIDES
 from springfoot.envs.settings.settings import CONDITION_SETTINGS, DRAWN_SETTINGS, THEME_OF, BipedSettings, body_of
 from springfoot.errors import SpringfootError
@@ -59,13 +58,13 @@ def decisions_of(
 
     A policy decides once in each step of the environment, of 20 ms by default. The decisions are those of all episodes
     and all `sides` together (0 left, 1 right; by default the `deciding_legs`, or both legs if there are none), in the
-    steady walk without its first `WARM_UP` seconds. Times with slack muscles (K = 0) are left out. `series` names
+    walk that is measured. Times with slack muscles (K = 0) are left out. `series` names
     another recorded pair of ankle and toe, such as the rest angles, to return in place of K.
     """
-    begin, end = steady_walk(recording.settings)
+    begin, end = recording.measured_span
     ticks_a_decision = round(recording.settings.step_seconds / TICK)
     samples = np.arange(0, recording.series["phase"].shape[1], ticks_a_decision)
-    samples = samples[(samples * TICK >= begin + WARM_UP) & (samples * TICK < end)]
+    samples = samples[(samples * TICK >= begin) & (samples * TICK < end)]
     if sides is None:
         sides = deciding_legs(recording.settings) or [LEFT, RIGHT]
     at_decisions = np.ix_(range(len(recording.ticks)), samples, sides)  # (episode, decision, side)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import ceil
+from math import ceil, isfinite
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -17,6 +17,7 @@ from springfoot.envs.batch.step_result import INFO, Tick
 from springfoot.envs.batch.walk import walked_steps
 from springfoot.envs.control.constants import LegConstants
 from springfoot.envs.control.reference_walk import reference_walk_at
+from springfoot.envs.control.standing import steady_walk
 from springfoot.envs.control.stiffness_control import FEET
 from springfoot.envs.control.subjects import DRAWN
 from springfoot.envs.physics.contact import CONTACTS
@@ -106,6 +107,23 @@ class Recording:
         standing = np.flatnonzero(self.fall_reason == "")
         return int(standing[0]) if len(standing) else int(np.argmax(self.ticks))
 
+    @property
+    def measured_span(self) -> tuple[float, float]:
+        """Return begin and end [s] of the walk that is measured: the steady one, without its first `WARM_UP` seconds;
+        an end of infinity where the body does not stop."""
+        begin, end = steady_walk(self.settings)
+        return begin + WARM_UP, end
+
+    @property
+    def measured_ticks(self) -> slice:
+        """Return the ticks of `measured_span`."""
+        begin, end = self.measured_span
+        return slice(round(begin / TICK), round(end / TICK) if isfinite(end) else None)
+
+    def episode(self, index: int) -> dict[str, NDArray]:
+        """Return name -> (T, ...) float64 series of one episode, its T samples before its end."""
+        return {name: values[index, : self.ticks[index]].astype(float) for name, values in self.series.items()}
+
     def of_episode(self, index: int) -> "Recording":
         """Return the recording of one episode alone, with its seed."""
         alone = slice(index, index + 1)
@@ -119,9 +137,8 @@ class Recording:
         )
 
     def shown(self) -> dict[str, NDArray]:
-        """Return name -> (T, ...) float64 series of the episode `example` alone, its T samples before its end."""
-        episode = self.example
-        return {name: values[episode, : self.ticks[episode]].astype(float) for name, values in self.series.items()}
+        """Return the series of the episode `example` (`episode`)."""
+        return self.episode(self.example)
 
     def save(self, path: Path) -> None:
         """Write the recording as `strides.npz`: its arrays, and all else as a header of JSON text, without pickles."""

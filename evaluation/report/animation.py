@@ -15,7 +15,7 @@ from springfoot.gait.people.gait_events import CONTACT_THRESHOLD_BW
 
 from ..numbers.per_leg import feet_differ, kinds_of
 from ..numbers.series import foot_contacts
-from ..recording.recording import TICK, WARM_UP, Recording
+from ..recording.recording import TICK, Recording
 
 SIZE = (460, 420)
 """Width and height of a frame [px]."""
@@ -64,14 +64,16 @@ def clip_of(recording: Recording, body: Body) -> tuple[int, int, int]:
     """Return the episode to show, and the clip's first tick and the tick after its last: two strides, or the walk's
     end.
 
-    The strides begin at a left heel strike after the warm-up; an episode that fell, or has too few, shows its end.
+    The strides begin at the first left heel strike of the walk that is measured; an episode that fell, or has too few,
+    shows its end.
     """
     episode = recording.example
     ticks = int(recording.ticks[episode])
     if not recording.fall_reason[episode]:
         left, _ = foot_contacts(recording.series["force"][episode, :ticks, ..., 1].sum(axis=2), body)
         strikes = np.round(left.heel_strikes / TICK).astype(int)
-        strikes = strikes[strikes >= round(WARM_UP / TICK)]
+        measured = recording.measured_ticks
+        strikes = strikes[(strikes >= measured.start) & (strikes < (measured.stop or ticks))]
         if len(strikes) > STRIDES:
             return episode, int(strikes[0]), int(strikes[STRIDES])
     return episode, max(0, ticks - round(LONGEST / TICK)), ticks

@@ -11,13 +11,12 @@ from typing import Any
 import numpy as np
 
 from springfoot.arrays import NDArray
-from springfoot.envs.control.standing import steady_walk
 from springfoot.envs.physics.model import SIDES
 from springfoot.envs.settings.settings import body_of
 from springfoot.gait.people.gait_events import PERCENT
 
 from ..numbers.series import GAIT_CYCLE_COLUMNS, foot_contacts, stride_curves, strides_within
-from ..recording.recording import WARM_UP, Recording
+from ..recording.recording import Recording
 
 STRIDE_KEYS = ("episode", "side", "stride", "begin_s", "stride_time_s", "fell", "percent")
 """Columns that identify the stride of a row, before `GAIT_CYCLE_COLUMNS`."""
@@ -43,14 +42,13 @@ def each_stride(recording: Recording) -> Iterator[tuple[dict[str, Any], NDArray]
     Curves are float32, in the order of `GAIT_CYCLE_COLUMNS`.
     """
     body = body_of(recording.settings)
-    begin, end = steady_walk(recording.settings)
     for episode, ticks in enumerate(recording.ticks.tolist()):
         if not ticks:
             continue
-        series = {name: values[episode, :ticks].astype(float) for name, values in recording.series.items()}
+        series = recording.episode(episode)
         fell = int(recording.fall_reason[episode] != "")
         for side, foot in enumerate(foot_contacts(series["force"][..., 1].sum(axis=2), body)):
-            strides = strides_within(foot, (begin + WARM_UP, end))
+            strides = strides_within(foot, recording.measured_span)
             curves = stride_curves(series, side, body, strides).astype(np.float32)
             for stride, ((start, _, stop), curve) in enumerate(zip(strides.tolist(), curves, strict=True)):
                 key_values = (episode, SIDES[side], stride, round(start, 6), round(stop - start, 6), fell)

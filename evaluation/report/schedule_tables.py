@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 
 from springfoot.arrays import NDArray
-from springfoot.envs.control.decision_times import gait_events
-from springfoot.envs.control.standing import steady_walk
+from springfoot.envs.control.decision_times import planned_events
 from springfoot.envs.control.stiffness_control import FEET
 from springfoot.envs.physics.model import SIDES, damping_times
 from springfoot.envs.settings.settings import body_of, reference_gait
@@ -24,7 +23,7 @@ from springfoot.gait.people.gait_events import PERCENT
 from springfoot.gait.springs.stiffness import SPRINGS
 
 from ..recording.open_loop import MEAN_KNOTS, alike_legs, deciding_legs, decisions_of, mean_over_phase
-from ..recording.recording import TICK, WARM_UP, Recording
+from ..recording.recording import Recording
 
 STATES = ("loading", "early mid-stance", "late mid-stance", "early push-off", "late push-off", "swing")
 """Phases of the stride in which a finite-state controller holds K and theta_eq."""
@@ -135,16 +134,15 @@ def finite_states(recording: Recording, legs: Sequence[int]) -> dict[str, Any]:
 
     They are of all `legs` (0 left, 1 right) together. K is the mean over the state; theta_eq is the rest angle with
     which the spring has the state's mean torque at its mean angle and rate. None stands for a state that the walk does
-    not have; times with slack muscles are left out. The states begin at the gait events of the target (`gait_events`),
-    the inner ones half-way between two.
+    not have; times with slack muscles are left out. The states begin at the target's events (`planned_events`), the
+    inner ones half-way between two.
     """
     settings = recording.settings
     body = body_of(recording.settings)
-    strike, flat, heel_off, toe_off = gait_events(reference_gait(settings))
+    strike, flat, heel_off, toe_off = planned_events(reference_gait(settings))
     starts = [strike, flat, (flat + heel_off) / 2, heel_off, (heel_off + toe_off) / 2, toe_off]
     events = ["heel strike", "foot flat", None, "heel-off", None, "toe-off"]  # None: half-way between two events
-    begin, end = steady_walk(settings)
-    ticks = slice(round((begin + WARM_UP) / TICK), round(end / TICK) if np.isfinite(end) else None)
+    ticks = recording.measured_ticks
     phase = recording.series["phase"][:, ticks, legs].ravel().astype(float)
     # Name -> (episode, tick, leg, ankle and toe); all but K have hip and knee too, which are left out below.
     columns = {

@@ -19,7 +19,7 @@ from springfoot.arrays import NDArray
 from springfoot.envs.batch import Biped
 from springfoot.envs.control import FED, SLOW_SPEED, LegConstants
 from springfoot.envs.settings import BipedSettings
-from springfoot.evaluation.numbers import StrideTally
+from springfoot.evaluation.numbers import LATE_SWING_PERCENT, StrideTally
 from springfoot.evaluation.recording import planned_course
 from springfoot.gait.people import PERCENT, HumanGait, force_features, stride_work
 
@@ -67,7 +67,7 @@ TOLERANCE = {
     "com_speed": 0.06,  # m/s, forward, against the plan over the step
     "cop": 0.025,  # m, against the plan's ZMP
     "beyond_sd": 0.06,  # N m/kg, of the hip moment beyond 1.9 SD from people's
-    "late_hip_moment": 0.06,  # N m/kg, from LATE_SWING on, beyond people's largest then by more than 0.1
+    "late_hip_moment": 0.06,  # N m/kg, from late swing on, beyond people's largest then by more than 0.1
     "speed": 0.02,  # m/s
     "period": 0.02,  # share of the plan's stride time
     "double_support": 0.02,  # s, against people's
@@ -96,8 +96,6 @@ BAND_SD = 1.9
 """Standard deviations of people's hip moment within which `beyond_sd` is 0 [-]."""
 MOST_WORK, LEAST_ANKLE_R = 1.2, 0.985
 """Positive work over people's beyond which `effort` counts, and r of the ankle's curve below which `ankle_r` counts."""
-LATE_SWING = 0.8
-"""Stride phase from which the hip holds the leg back before it lands."""
 FOREIGN_SHARE = 0.3
 """Weight of walks with foreign springs; the thesis's lines have weight 1. Chosen: at full weight legs stand nearly any
 spring, and the knee of the walk with the schedule is 5 degrees off people's."""
@@ -233,7 +231,7 @@ def misses(tally: StrideTally, biped: Biped) -> NDArray:
     off["beyond_sd"] = _excess(off["hip_moment"], band)
     off = {name: values / np.sqrt(len(values)) for name, values in off.items()}  # so that the length is an RMS
     # Numbers: timing, peaks, work, and the properties of a good walk.
-    late = phase > LATE_SWING
+    late = PERCENT > LATE_SWING_PERCENT
     late_hip_moment = mean["hip_moment"][late] - target_mean["hip_moment"][late].max()
     off["late_hip_moment"] = np.maximum(late_hip_moment - ALLOWED["late_hip_moment"], 0.0)
     off["speed"] = np.mean(tally.speed) - biped.settings.speed

@@ -26,7 +26,7 @@ from springfoot.envs.settings import BipedSettings, body_of
 from springfoot.envs.task import ANKLE_STIFFNESS_UNIT, TOE_STIFFNESS_UNIT
 from springfoot.errors import SpringfootError
 from springfoot.evaluation.numbers import measure
-from springfoot.evaluation.recording import TICK, WARM_UP, Recording, policy_and_settings, record
+from springfoot.evaluation.recording import WARM_UP, Recording, policy_and_settings, record
 from springfoot.files.markdown import table, text_of
 from springfoot.gait.body import TOE_STIFFNESS, Body
 from springfoot.gait.springs import SPRINGS, Segment, StiffnessSchedule
@@ -63,13 +63,13 @@ class MeanSprings:
 
 
 def mean_springs(recording: Recording) -> MeanSprings:
-    """Return the mean springs of a recorded gait, without the first `WARM_UP` seconds of each episode; in segments
-    without a sample they are interpolated.
+    """Return the mean springs of a recorded gait, where it is measured; in segments without a sample they are
+    interpolated.
 
     Raises `SpringfootError` for a gait without samples in half of the segments or more.
     """
-    begin = round(WARM_UP / TICK)
-    phase = recording.series["phase"][:, begin:].ravel()
+    ticks = recording.measured_ticks
+    phase = recording.series["phase"][:, ticks].ravel()
     valid = np.isfinite(phase)
     # Index of the segment of each sample; a phase of float32 just below 1 may round up to it.
     segment = np.minimum((phase[valid] * PHASE_SEGMENTS).astype(int), PHASE_SEGMENTS - 1)
@@ -81,7 +81,7 @@ def mean_springs(recording: Recording) -> MeanSprings:
     def mean(name: str) -> NDArray:
         """Return the mean of a series in each segment, (PHASE_SEGMENTS, (ankle, toe)), interpolated where there is no
         sample."""
-        values = recording.series[name][:, begin:]  # of all four joints, but `stiffness` of ankle and toe alone
+        values = recording.series[name][:, ticks]  # of all four joints, but `stiffness` of ankle and toe alone
         values = (values if name == "stiffness" else values[..., FEET]).reshape(-1, 2)[valid].astype(float)
         totals = [np.bincount(segment, values[:, joint], PHASE_SEGMENTS)[seen] for joint in range(2)]
         return np.stack([np.interp(STARTS, STARTS[seen], total / count[seen], period=1.0) for total in totals], -1)

@@ -93,7 +93,8 @@ def samples(
     states = np.concatenate([trunk, *above, earlier], -1)
     tick = np.arange(phase.shape[1])
     end = recording.ticks - np.where(recording.fall_reason == "", 0, round(LAST_SECOND / TICK))
-    walked = (tick >= round(WARM_UP / TICK)) & (tick < end[:, None])
+    measured = np.isin(tick, tick[recording.measured_ticks])
+    walked = measured & (tick < end[:, None])
     keep = walked[..., None] & np.isfinite(states).all(-1) & np.isin(range(len(SIDES)), legs)
     if not keep.any():
         raise SpringfootError(f"{recording.policy} walks no strides after {WARM_UP:g} s whose springs could be found")
@@ -153,6 +154,8 @@ def identified(pushed: Samples, undisturbed: Samples | None = None, margin: floa
         pushed: samples of walking under pushes.
         undisturbed: samples without pushes, for the usual estimator; None leaves it out.
         margin: part of the stride to leave out at both ends of a phase.
+
+    Raises `SpringfootError` for a phase without samples.
     """
     rows = []
     course_phase = (np.arange(COURSE) + 0.5) / COURSE
@@ -168,6 +171,10 @@ def identified(pushed: Samples, undisturbed: Samples | None = None, margin: floa
         mean_torque = np.abs(pushed.course[:, column])
         for spring, usual_spring in zip(by_pushes, usual, strict=True):
             inside = (pushed.phase >= spring.start + margin) & (pushed.phase < spring.end - margin)
+            if not inside.any():
+                raise SpringfootError(
+                    f"no sample lies in stride phases {spring.start:g} to {spring.end:g}: walk longer"
+                )
             applied = pushed.stiffness[inside, column]
             in_phase = mean_torque[(course_phase >= spring.start) & (course_phase < spring.end)]
             rows.append(

@@ -13,7 +13,7 @@ from springfoot.arrays import NDArray
 from springfoot.envs.physics import ANKLE, JOINTS, SIDES
 from springfoot.envs.settings import body_of
 from springfoot.evaluation.numbers import Gait, foot_contacts, leg_numbers, measure, strides_within
-from springfoot.evaluation.recording import TICK, WARM_UP, Recording
+from springfoot.evaluation.recording import TICK, Recording
 from springfoot.gait import GRAVITY, PERCENT
 from springfoot.gait.people import on_percent
 
@@ -160,6 +160,6 @@ def _ankle_fibre_moment(recording: Recording) -> NDArray:
     contacts = foot_contacts(series["force"][..., 1].sum(axis=2), body_of(recording.settings))
     curves = []
     for side, foot in enumerate(contacts):
-        begin, _, end = strides_within(foot, (WARM_UP, np.inf)).T
+        begin, _, end = strides_within(foot, recording.measured_span).T
         curves.append(on_percent(series["fibre_moment"][:, side, ANKLE], begin, end, TICK, first=TICK / 2))
     return np.concatenate(curves).mean(axis=0)

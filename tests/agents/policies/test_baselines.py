@@ -173,3 +173,11 @@ def test_unknown_baselines_are_refused_with_one_line(name):
     with pytest.raises(SpringfootError) as caught:
         baseline(name, BipedSettings())
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("acts", ["person", "both"])
+@pytest.mark.parametrize("name", BASELINES)
+def test_a_baseline_moves_no_legs(name, acts):
+    said = rf"^baselines set stiffness alone: acts must be stiffness for {name}, got {acts}$"
+    with pytest.raises(SpringfootError, match=said):
+        baseline(name, settings_of(name, acts=acts))

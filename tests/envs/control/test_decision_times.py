@@ -9,7 +9,7 @@ from springfoot.agents.training.config import TrainingConfig
 from springfoot.agents.training.ppo import Learner
 from springfoot.agents.training.sb3_vec_env import SegmentedFootBipedVecEnv
 from springfoot.envs.batch.biped_batch import Biped
-from springfoot.envs.control.decision_times import gait_events
+from springfoot.envs.control.decision_times import planned_events
 from springfoot.envs.control.phase_table import GRID
 from springfoot.envs.control.stiffness_control import stiffness_of
 from springfoot.envs.settings.settings import BipedSettings, settings_from, settings_to_json
@@ -84,7 +84,7 @@ def test_training_discounts_by_time():
 
 def test_per_event_each_leg_takes_a_new_action_at_its_events_alone():
     biped, random, names = begun(num=4, decisions="event"), np.random.default_rng(0), ("left", "right")
-    events = gait_events(biped.target)
+    events = planned_events(biped.target)
     assert (np.diff(events) > 0.03).all() and events[0] == 0.0 and events[-1] == biped.target.toe_off
     before: Any = None
     changes, running = np.zeros((2, 4), int), np.ones(4, bool)

@@ -7,7 +7,9 @@ from collections.abc import Sequence
 from importlib import import_module
 from itertools import product
 from pathlib import Path
+from types import FunctionType
 
+import numpy as np
 import pytest
 from numba.core.dispatcher import Dispatcher
 
@@ -31,6 +33,17 @@ def test_a_kernel_stands_below_all_that_it_uses_and_tells_its_ten_arguments_at_m
     assert function.__qualname__ == f"{function.__name__}_{_fingerprint(function)}"  # nothing came to be known since
     assert function.__code__.co_argcount <= 10
     assert function.__doc__
+
+
+TABLE = np.arange(6.0)
+
+
+def test_an_array_of_another_shape_is_another_kernel():
+    def first(i):
+        return TABLE[i].sum()
+
+    tables = (TABLE.reshape(shape) for shape in ((2, 3), (3, 2), (6,)))
+    assert len({_fingerprint(FunctionType(first.__code__, {"TABLE": table})) for table in tables}) == 3
 
 
 CALLEE = """

@@ -80,8 +80,8 @@ def test_searches_and_studies_measure_as_an_evaluation_does(monkeypatch):
 
     recording = record(policy, walked, name="", episodes=1)
 
-    def paid_by_search():
-        return leg_cost.cost(settings, [COMMITTED], seed=0, threads=1, push=0.0, foreign=0.0)[0]
+    def paid_by_search(pays: leg_cost.Pays = "likeness"):
+        return leg_cost.cost(settings, [COMMITTED], seed=0, threads=1, push=0.0, foreign=0.0, pays=pays)[0]
 
     def three():
         toe_off = measure(recording).metrics["toe_off_percent"]
@@ -89,6 +89,7 @@ def test_searches_and_studies_measure_as_an_evaluation_does(monkeypatch):
         return paid_by_search(), toe_off, step_length
 
     paid, toe_off, step_length = three()
+    paid_for_effort = paid_by_search("effort")
     speed = measure(recording).metrics["speed_m_s"]["mean"]
     distance = numbers_series.distance_walked
     with monkeypatch.context() as faster:
@@ -104,6 +105,7 @@ def test_searches_and_studies_measure_as_an_evaluation_does(monkeypatch):
     paid_late, toe_off_late, step_length_late = three()
     assert toe_off_late < toe_off - 1.0 and abs(paid_late - paid) > 0.1
     assert (step_length_late != step_length).all()
+    assert abs(paid_by_search("effort") - paid_for_effort) > 0.01
 
 
 def run(*words):

@@ -8,13 +8,14 @@ import pytest
 from springfoot.envs.control.constants import leg_constants
 from springfoot.envs.settings.settings import BipedSettings
 from springfoot.errors import SpringfootError
+from springfoot.evaluation.numbers.planned_task import effort_and_impact, impact_of
 from springfoot.gait import Body
 from springfoot.gait.body.body import GRAVITY
 from springfoot.gait.plan.effort import ACTIVATION_TIME, MUSCLE_EFFICIENCY
 from springfoot.studies.searches.leg_cost import FALL_COST, cost, misses
 from springfoot.studies.searches.leg_tuning import LegTuning
-from springfoot.studies.searches.leg_walks import measured, walk
-from springfoot.studies.searches.walk_effort import effort_and_impact, effort_price, impact_of
+from springfoot.studies.searches.leg_walks import SETTLED, measured, walk
+from springfoot.studies.searches.walk_effort import effort_price
 
 BODY = Body()
 SETTINGS = BipedSettings(guide="plan", episode_seconds=10.0)
@@ -35,7 +36,7 @@ def test_a_walk_is_measured_as_it_was_simulated():
     tally = measured(series, biped)
     assert walked.missing[0] == 0.0 and tally is not None
     missed = misses(tally, biped)
-    effort, impact, held = effort_and_impact(series, tally, biped)
+    effort, impact, held = effort_and_impact(series, tally, biped, SETTLED)
     assert held["speed"] == pytest.approx(0.0, abs=0.05) and held["period"] == pytest.approx(0.0, abs=0.03)
     # Over strides that repeat themselves joints do little net work, and the energy is that of their work.
     own = series["joint_work"].sum((0, 1, 2))
@@ -60,7 +61,7 @@ def test_a_limp_is_unsteady_and_a_walk_off_its_plan_is_out_of_place():
         changed = series | change
         tally = measured(changed, biped)
         assert tally is not None
-        return effort_and_impact(changed, tally, biped)
+        return effort_and_impact(changed, tally, biped, SETTLED)
 
     level, limping, ahead, early = map(found, ({}, {"force": force}, {"com": com}, {"phase": 0.9 * series["phase"]}))
     assert limping[2]["unsteady"] > level[2]["unsteady"] + 0.03

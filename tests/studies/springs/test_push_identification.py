@@ -1,5 +1,6 @@
 """The laboratory's experiment: known springs are found from pushes, and a policy that reacts is called so."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -96,6 +97,15 @@ def test_the_pretrained_policy_reacts_in_every_loaded_phase():
 def test_a_stiffness_held_for_20_ms_is_no_function_of_the_phase_where_it_ramps():
     ankle = {row.start: row for row in identified(samples(pushed("schedule", "50hz"))) if row.joint == "ankle"}
     assert ankle[0.22].pushed.verdict == REACTS
+
+
+def test_a_phase_without_samples_is_one_line():
+    data = samples(pushed("schedule"))
+    early = data.phase < 0.5
+    columns = {name: getattr(data, name)[early] for name in ("trial", "phase", "torque", "angle", "velocity", "states")}
+    half = replace(data, **columns, stiffness=data.stiffness[early])
+    with pytest.raises(SpringfootError, match=r"^no sample lies in stride phases 0\.[5-9]\d* to .*: walk longer$"):
+        identified(half)
 
 
 def test_scrambled_torque_makes_no_spring():
