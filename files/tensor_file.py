@@ -71,6 +71,8 @@ def read_tensors(
                 raise SpringfootError(f"{path} is a .safetensors file, but no springfoot {kind}")
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118
         header = json.loads(text)
+    except SpringfootError:
+        raise
     except (SafetensorError, OSError, TypeError, AttributeError) as error:  # the last two: types NumPy lacks (bfloat16)
         raise SpringfootError(f"{path} is not a .safetensors file: {error}") from None
     except (ValueError, RecursionError) as error:

@@ -14,6 +14,7 @@ from math import ceil, floor, sqrt
 import numpy as np
 
 from springfoot.arrays import NDArray
+from springfoot.errors import SpringfootError
 from springfoot.gait.body.body import Body
 from springfoot.gait.people.human import HumanGait
 from springfoot.gait.plan.com_plan import ComPlan, over_peoples_zmp
@@ -60,9 +61,19 @@ def reference_walks(settings: BipedSettings, legs: Sequence[LegConstants] | None
     """Return the walks of the settings' body at `tabulated_speeds`, slowest first.
 
     `legs` are leg constants in place of the committed ones, the same at every speed. Raises `SpringfootError` for a
-    walk that cannot be planned.
+    walk that cannot be planned, with its speed and the settings that ask for it.
     """
-    return tuple(reference_walk_at(settings, float(speed), legs) for speed in tabulated_speeds(settings))
+    ranges = {"height_range": settings.height_range, "speed_range": settings.speed_range}
+    asked = " and ".join(f"{name} {value}" for name, value in ranges.items() if value is not None)
+    walks = []
+    for speed in tabulated_speeds(settings):
+        constants = legs or _tuned_constants(settings, speed)
+        try:
+            walks.append(reference_walk_at(settings, float(speed), constants))
+        except SpringfootError as error:
+            of_ranges = f", asked for by {asked}" if asked else ""
+            raise SpringfootError(f"no walk of {settings.height:g} m at {speed:.3g} m/s{of_ranges}: {error}") from None
+    return tuple(walks)
 
 
 def reference_walk_at(
@@ -71,10 +82,9 @@ def reference_walk_at(
     """Return the walk of the settings' body at `speed` [m/s]; `legs` as for `reference_walks`."""
     body = body_of(settings)
     people = reference_gait(settings, speed)
-    equal_speed = speed / sqrt(body.length_scale)
-    legs = legs or [_tuned_constants(settings, equal_speed)]
+    legs = legs or _tuned_constants(settings, speed)
     if settings.follows_plan:
-        style = least_work(equal_speed, plan_file_of(settings))
+        style = least_work(speed / sqrt(body.length_scale), plan_file_of(settings))
         plan = plan_walk(body, speed, settings.cadence, human=people, style=style)
         target = gait_of(plan)
         moments = _moments_of(target, body)
@@ -93,10 +103,11 @@ def reference_walk_at(
     )
 
 
-def _tuned_constants(settings: BipedSettings, speed: float) -> LegConstants:
-    """Return the tuned constants for the settings at `speed` [m/s at 1.70 m]."""
-    named_by = settings.equilibrium, settings.cadence, speed, settings.feedforward, settings.follows_plan
-    return leg_constants(*named_by, plan_file_of(settings))
+def _tuned_constants(settings: BipedSettings, speed: float) -> list[LegConstants]:
+    """Return the tuned constants for the settings' body at `speed` [m/s], one variant."""
+    equal_speed = speed / sqrt(body_of(settings).length_scale)  # of a body of 1.70 m
+    named_by = settings.equilibrium, settings.cadence, equal_speed, settings.feedforward, settings.follows_plan
+    return [leg_constants(*named_by, plan_file_of(settings))]
 
 
 def _moments_of(gait: HumanGait, body: Body) -> NDArray:

@@ -9,7 +9,7 @@ CoM. On a slope the frame leans with the ground, and the trunk stays upright in 
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from math import cos, pi, radians, sqrt
+from math import ceil, cos, floor, pi, radians, sqrt
 from typing import Literal, get_args
 
 import numpy as np
@@ -153,7 +153,9 @@ def plan_walk(
     foot in the ground.
     """
     unit = sqrt(body.length_scale)
-    slowest, fastest = (round(unit * equal, 2) for equal in EQUAL_SPEED_RANGE)
+    slowest, fastest = (unit * equal for equal in EQUAL_SPEED_RANGE)
+    # Outwards to centimetres a second, so that the ends themselves are inside; 1e-6 against ends that miss by rounding.
+    slowest, fastest = floor(100 * slowest + 1e-6) / 100, ceil(100 * fastest - 1e-6) / 100
     speed = require_within("speed", speed, (slowest, fastest), "m/s")
     if cadence not in get_args(Cadence):
         raise SpringfootError(f"cadence must be 'people' or 'thesis', got {cadence!r}")

@@ -120,3 +120,24 @@ def test_what_is_not_allowed_is_refused_in_one_clear_line(attempt, words):
     with pytest.raises(SpringfootError, match=words) as caught:
         attempt()
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ({"height": 1.0, "speed": 2.0}, r"^no walk of 1 m at 2 m/s: legs too short for this step: "),
+        (
+            {"height_range": (1.0, 2.3), "speed_range": (0.4, 2.0)},
+            r"^no walk of 1\.7 m at 2\.5 m/s, asked for by height_range \(1\.0, 2\.3\) and speed_range ",
+        ),
+    ],
+)
+def test_a_body_too_short_for_a_speed_is_told_with_the_settings_that_ask_for_it(values, said):
+    with pytest.raises(SpringfootError, match=said):
+        Biped(BipedSettings(**values), 1)
+
+
+def test_the_slowest_speed_of_the_tallest_body_can_be_planned():
+    """At a height at which that speed of the settings' body, rounded to centimetres, would be a faster one."""
+    settings = BipedSettings(height=1.8446, height_range=(1.7, 2.3), speed_range=(0.4, 1.2))
+    assert reference_walk_at(settings, float(tabulated_speeds(settings)[0])).speed == pytest.approx(0.3582, abs=1e-4)
