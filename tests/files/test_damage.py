@@ -80,7 +80,8 @@ def test_a_header_that_says_it_is_huge_is_refused_unread(tmp_path):
     with path.open("wb") as file:
         file.write((2**26).to_bytes(8, "little"))
         file.truncate(2**26 + 9)
-    with pytest.raises(SpringfootError, match=r"^\S+ is not a .safetensors file: its header would have 67,108,864 bytes, at most 16,777,216 are read"):
+    said = r"^\S+ is not a .safetensors file: its header would have 67,108,864 bytes, at most 16,777,216 are read"
+    with pytest.raises(SpringfootError, match=said):
         read_policy(path)
 
 
