@@ -254,6 +254,7 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
     | `stiffness_delay_range_s` | `None`          | delays drawn at each reset [s], in place of it                     |
     | **reward**                |                 |                                                                    |
     | `reward_weights`          | `{}`            | weights that differ from the table above                           |
+    | `forward_force_weight`    | `1.0`           | weight of the forward force in the term `grf`, [0, 10]             |
 
     and `render_mode`: `"human"`, `"rgb_array"` or None.
 

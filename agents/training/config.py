@@ -55,6 +55,9 @@ class TrainingConfig:
     """Lambda of the generalised advantage estimate, per 20 ms [0..1]."""
     clip_range: float = 0.2
     """Largest relative change of an action's probability that one update rewards."""
+    critic_steps: int = 0
+    """Environment steps at the start in which the critic alone learns, so that a good policy to begin from is not led
+    astray by an untrained critic."""
     log_std: float = -0.9
     """Logarithm of the standard deviation of the actions at the start."""
     hidden: tuple[int, ...] = (64, 64)
@@ -73,6 +76,7 @@ class TrainingConfig:
         for name in ("timesteps", "num_envs", "minibatches", "epochs", "eval_interval", "eval_episodes"):
             require_count(name, getattr(self, name), 1, MOST_ENVIRONMENTS if name in _SIDE_BY_SIDE else MOST_COUNT)
         require_count("seed", self.seed, 0, 2**31 - 1)
+        require_count("critic_steps", self.critic_steps, 0)
         require_count("threads", self.threads, 0, MOST_THREADS)
         if self.device not in DEVICES:
             raise SpringfootError(f"device must be {' or '.join(DEVICES)}, got {quoted(self.device)}")
@@ -250,11 +254,13 @@ def config_from_json(values: dict[str, Any]) -> TrainingConfig:
 
 
 def require_of_rllib(config: TrainingConfig) -> None:
-    """Raise `SpringfootError` for a mirrored network and for a GPU, on which RLlib does not train here."""
+    """Raise `SpringfootError` for a mirrored network, a GPU and steps of the critic alone, which RLlib has not here."""
     if config.mirrored:
         raise SpringfootError("--engine rllib trains no mirrored network: give --mirrored False, or another engine")
     if config.device != "cpu":
         raise SpringfootError(f"--engine rllib learns on the CPU; drop --device {config.device}, or --engine")
+    if config.critic_steps:
+        raise SpringfootError("--engine rllib trains actor and critic together; drop --critic-steps, or --engine")
 
 
 def processors() -> int:

@@ -29,6 +29,27 @@ POLICY_SAMPLES = 1_000_000.0
 say; chosen."""
 
 
+class _CriticFirstPPO(PPO):
+    """stable-baselines3's PPO, whose actor and exploration stay as they are in the first `critic_steps` steps."""
+
+    critic_steps = 0
+
+    def train(self) -> None:
+        """Learn from the rollout."""
+        learns_all = self.num_timesteps >= self.critic_steps
+        optimizer = self.policy.optimizer
+        for name, parameter in self.policy.named_parameters():
+            if "value" not in name:  # the critic's layers are `mlp_extractor.value_net` and `value_net`
+                parameter.requires_grad_(learns_all)
+                if not learns_all and parameter not in optimizer.state:  # as before the first step, for the checkpoints
+                    optimizer.state[parameter] = {
+                        "step": torch.tensor(0.0),
+                        "exp_avg": torch.zeros_like(parameter),
+                        "exp_avg_sq": torch.zeros_like(parameter),
+                    }
+        super().train()
+
+
 class Learner:
     """An untrained actor and critic on a batch of environments, with stable-baselines3's PPO to train them.
 
@@ -59,7 +80,7 @@ class Learner:
         samples = self.rollout_steps * config.num_envs
         with warnings.catch_warnings():  # a last minibatch that is a few samples smaller does no harm
             warnings.filterwarnings("ignore", message="You have specified a mini-batch size")
-            self.ppo = PPO(
+            self.ppo = _CriticFirstPPO(
                 MirroredNetwork if config.mirrored else "MlpPolicy",
                 self.normalized,
                 # left: fraction of the training that is still to come, 1 at its start
@@ -79,6 +100,7 @@ class Learner:
                 seed=seed,
                 device=config.device,
             )
+        self.ppo.critic_steps = config.critic_steps
 
     def policy(self, fingerprint: dict[str, str]) -> Policy:
         """Return a copy of the actor as a policy that acts by its mean action, with the environment's `fingerprint`.

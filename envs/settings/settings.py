@@ -237,6 +237,8 @@ class BipedSettings:
     """Delays drawn at each reset in place of `stiffness_delay_s`, evenly from the steps of 0.01 s [s]."""
     reward_weights: dict[str, float] = field(default_factory=dict, metadata=_REWARD)
     """Weights that differ from `DEFAULT_WEIGHTS`, by the name of the reward term [-]."""
+    forward_force_weight: float = field(default=1.0, metadata=_REWARD)
+    """Weight of the forward force against the vertical one in the term `grf` [0..10]: people's is a fifth as large."""
 
     def __post_init__(self) -> None:
         body_of(self)  # raises for an impossible one
@@ -275,6 +277,7 @@ class BipedSettings:
         self._check_world()
         self._check_person()
         check_weights(self.reward_weights, DEFAULT_WEIGHTS)
+        require_number("forward_force_weight", self.forward_force_weight, 0.0, 10.0)
         check_bounds(self)
 
     @property

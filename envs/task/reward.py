@@ -66,6 +66,7 @@ TASK_OPTIONS = np.dtype(
         ("share", float),  # of it in `ACTION_STEP`
         ("most_steps", float),  # beyond which an episode is truncated
         ("tendon", float),  # stiffness of the Achilles tendon at 1.70 m and 63 kg [N m/rad], 0 for no bound
+        ("forward", float),  # weight of the forward force in the term `grf`
     ]
 )
 """Numbers of the settings that rewards need."""
@@ -109,9 +110,9 @@ def _pose_error(scale, pitch, angle, target):
 
 
 @part
-def _force_distance(scale, forces, i, side, target):
-    """Return how far one foot's mean force in a step is outside the target's range, forward and up added, and
-    `EXCESS_SHARE` of the mean vertical force beyond `MAX_FORCE` [body weights].
+def _force_distance(scale, forces, i, side, target, weight):
+    """Return how far one foot's mean force in a step is outside the target's range, `weight` times forward and up
+    added, and `EXCESS_SHARE` of the mean vertical force beyond `MAX_FORCE` [body weights].
 
     `forces` (W, N, side, contact, 2) [N], forward and up, are those of the step's windows; the body is number `i`.
     `scale` is of `SCALES`, `target` of `TARGET`.
@@ -126,7 +127,7 @@ def _force_distance(scale, forces, i, side, target):
         excess += max(vertical - MAX_FORCE, 0.0) / count
     beyond_forward = max(abs(forward - target.force[0]) - target.force_band[0], 0.0)
     beyond_up = max(abs(up - target.force[1]) - target.force_band[1], 0.0)
-    return EXCESS_SHARE * excess + beyond_forward + beyond_up
+    return EXCESS_SHARE * excess + weight * beyond_forward + beyond_up
 
 
 @part
@@ -214,7 +215,7 @@ def judge(rows, controls, bodies, table, options, forces, terms) -> None:
     `pose`, exp(-E/0.02) with E = 1/2 sum over legs of (3, 2.5, 3, 0.1) x squared distance [rad^2] of thigh (to the
     vertical), knee, ankle and toe from the target at the leg's phase.
     `grf`, exp(-D/0.4) with D the body weights by which the feet's forces leave the target's range: vertical beyond 1.2
-    (fourfold), both components beyond mean +- 0.5 SD at the leg's phase.
+    (fourfold), both components beyond mean +- 0.5 SD at the leg's phase, forward times `forward_force_weight`.
     Costs >= 0: `stiffness_rate`, squared change of the action in 20 ms; `stiffness`, mean over legs of
     [(K_ankle/300)^2 + (K_toe/60)^2/4]/1.25, K of muscles and of an adaptive device (other devices and slack
     muscles cost nothing; with a tendon see `charged_calf_stiffness`), scaled to 1.70 m and 63 kg; `effort`, positive
@@ -252,7 +253,7 @@ def judge(rows, controls, bodies, table, options, forces, terms) -> None:
         pose_error = force_distance = stiffness_cost = stiffness_rate = 0.0
         for side in range(2):
             pose_error += 0.5 * _pose_error(scale, m.base[2], m.angle[side], targets[side])
-            force_distance += _force_distance(scale, forces, i, side, targets[side])
+            force_distance += _force_distance(scale, forces, i, side, targets[side], options[0].forward)
             for joint in range(2):
                 k = _charged_stiffness(scale, control, bodies[i], options[0].tendon, side, joint)
                 k /= scale.stiffness_unit[joint]
@@ -323,7 +324,8 @@ class Task:
         share = seconds / ACTION_STEP
         limit = settings.max_episode_steps
         tendon = settings.ankle_tendon or 0.0
-        self.options = np.array([(weights, seconds, share, limit, tendon)], TASK_OPTIONS)
+        forward = settings.forward_force_weight
+        self.options = np.array([(weights, seconds, share, limit, tendon, forward)], TASK_OPTIONS)
         """(1,) of `TASK_OPTIONS`."""
         curves = {walk: target_curves(walk.target, walk.plan, seconds) for _, walk in rows}
         self.table = PhaseTable(np.stack([curves[walk].view(float).reshape(len(GRID), -1) for _, walk in rows])).table

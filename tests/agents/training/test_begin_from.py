@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from safetensors.numpy import load_file
 
 from springfoot.agents import TrainingConfig, read_policy, train
 from springfoot.agents.training.checkpoint import checkpoints
@@ -94,3 +95,28 @@ def test_a_run_without_its_first_checkpoint_is_not_begun_anew_from_nothing(run, 
 def test_the_flag_begins_one_run(run, tmp_path, capsys):
     assert train_main(["--begin-from", str(run), "--seeds", "2", "--out", str(tmp_path / "two")]) == 2
     assert "--begin-from begins one run" in capsys.readouterr().err
+
+
+def test_the_actor_rests_while_the_critic_learns_alone(run, tmp_path):
+    resting = dataclasses.replace(SHORT, critic_steps=256)
+    train(dataclasses.replace(SHORT, timesteps=256, critic_steps=512), tmp_path / "rested", begin_from=run)
+    train(resting, tmp_path / "whole", begin_from=run)
+    train(resting, tmp_path / "cut", [lambda entry: False], begin_from=run)
+    resume(tmp_path / "cut")
+    begun = weights_of(read_policy(run / "last.safetensors"))
+    rested, whole, cut = (
+        weights_of(read_policy(tmp_path / name / "last.safetensors")) for name in ("rested", "whole", "cut")
+    )
+    assert (rested == begun).all() and (whole != begun).any()
+    assert (whole == cut).all()
+    before, after = (load_file(checkpoints(folder)[0]) for folder in (run, tmp_path / "rested"))
+    critic = [name for name in before if name.startswith("network.") and "value" in name]
+    actor = [name for name in before if name.startswith("network.") and "value" not in name]
+    assert critic and all((before[name] != after[name]).any() for name in critic)
+    assert actor and all((before[name] == after[name]).all() for name in actor)
+
+
+@pytest.mark.parametrize("steps", [-1, 0.5, True])
+def test_steps_of_the_critic_alone_are_a_whole_number(steps):
+    with pytest.raises(SpringfootError, match=r"^critic_steps must be "):
+        dataclasses.replace(SHORT, critic_steps=steps)

@@ -55,4 +55,4 @@ def test_every_example_is_a_learner_short_and_in_the_page():
     assert set(examples) == {learner.example for learner in learners.LEARNERS}
     assert max(len(text.splitlines()) for text in examples.values()) <= 64  # four for imports that may be missing
     page = (learners.ROOT / "docs" / "how-to" / "learners.md").read_text(encoding="utf-8")
-    assert all(f"(../../examples/learners/{name}.py)" in page for name in examples)
+    assert all(f"`{name}.py`" in page for name in examples)

@@ -155,6 +155,19 @@ def test_force_is_rewarded_within_people_and_less_with_each_body_weight_beyond(t
     np.testing.assert_allclose(away(1.5), (1.5 - mean - band) + EXCESS_SHARE * 0.3, atol=2e-3)
 
 
+@pytest.mark.parametrize("weight", [0.0, 1.0, 3.0])
+def test_the_forward_force_counts_by_its_weight(weight):
+    setup = Setup(forward_force_weight=weight)
+    phase = np.array([0.15])
+    force = setup.people_force(phase)
+    force[:, :, LEFT, 1, 0] += 0.1 * setup.body.mass * GRAVITY
+    measured = setup.measurement(phase)
+    away = -FORCE_TOLERANCE * np.log(setup.terms(measured, phase, force_windows=force)["grf"])
+    middle = phase - 0.01 / setup.plan.stride_time
+    band = 0.5 * setup.human.sd("grf_forward", middle)
+    np.testing.assert_allclose(away, weight * (0.1 - band), atol=3e-3 * max(weight, 1.0))
+
+
 def test_the_excess_of_a_single_window_is_not_averaged_away(thesis_body):
     phase = np.array([0.15])
     force = thesis_body.people_force(phase)
