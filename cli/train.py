@@ -38,8 +38,9 @@ class TrainFlags:
     out: Annotated[Path | None, FOLDER] = None
     """New folder for the run."""
     resume: Annotated[Path | None, FOLDER] = None
-    """Folder of a run to continue, with its saved settings, bit for bit as if nothing had interrupted it. --timesteps
-    then counts further steps; --threads, --device and --reward-weights may be changed."""
+    """Folder of a run to continue, with its saved settings, bit for bit as if nothing had interrupted it; on a GPU with
+    other random numbers. --timesteps then counts further steps; --threads, --device and --reward-weights may be
+    changed."""
     begin_from: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER|POLICY", help_behavior_hint="")] = None
     """Folder of a run, or a policy (`learned`, a file), whose network the training begins with, in place of an
     untrained one, as to adapt a person to one foot; the task may be another, observations and actions not."""
@@ -102,6 +103,8 @@ def run_training(flags: TrainFlags) -> int:
             raise SpringfootError("--seeds begins anew; continue each seed's own by --resume FOLDER/seed-N")
         if "threads" in settings:
             raise SpringfootError("--seeds gives each seed one thread; drop --threads")
+        if settings.get("device", "cpu") != "cpu":
+            raise SpringfootError("--seeds trains on the CPU; drop --device")
         require_count("seeds", flags.seeds)
     if flags.resume and (fixed := sorted(set(settings) - RESUMED)):
         raise SpringfootError(f"--resume continues with the saved settings; drop --{fixed[0].replace('_', '-')}")

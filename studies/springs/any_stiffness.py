@@ -26,7 +26,7 @@ from springfoot.envs.settings import BipedSettings, body_of
 from springfoot.envs.task import ANKLE_STIFFNESS_UNIT, TOE_STIFFNESS_UNIT
 from springfoot.errors import SpringfootError
 from springfoot.evaluation.numbers import measure
-from springfoot.evaluation.recording import WARM_UP, Recording, policy_and_settings, record
+from springfoot.evaluation.recording import Recording, policy_and_settings, record
 from springfoot.files.markdown import table, text_of
 from springfoot.gait.body import TOE_STIFFNESS, Body
 from springfoot.gait.springs import SPRINGS, Segment, StiffnessSchedule
@@ -76,7 +76,9 @@ def mean_springs(recording: Recording) -> MeanSprings:
     count = np.bincount(segment, minlength=PHASE_SEGMENTS)
     seen = count > 0  # a leg that lands early skips the last segments: they are interpolated
     if not valid.any() or seen.sum() < PHASE_SEGMENTS / 2:
-        raise SpringfootError(f"{recording.policy} walks no strides after {WARM_UP:g} s whose springs could be rebuilt")
+        raise SpringfootError(
+            f"{recording.policy} walks no strides whose springs could be rebuilt, where it is measured"
+        )
 
     def mean(name: str) -> NDArray:
         """Return the mean of a series in each segment, (PHASE_SEGMENTS, (ankle, toe)), interpolated where there is no

@@ -17,7 +17,7 @@ from springfoot.envs.control import FEET, PLATEAUS
 from springfoot.envs.physics import ANKLE, LEFT, RIGHT, SIDES
 from springfoot.envs.settings import BipedSettings
 from springfoot.errors import SpringfootError
-from springfoot.evaluation.recording import TICK, WARM_UP, Recording, policy_and_settings
+from springfoot.evaluation.recording import TICK, Recording, policy_and_settings
 from springfoot.gait.springs import SPRINGS, PhaseSpring, PushedSpring, identify, identify_pushed
 
 BOUNDS = (*PLATEAUS, 1.0)
@@ -97,7 +97,7 @@ def samples(
     walked = measured & (tick < end[:, None])
     keep = walked[..., None] & np.isfinite(states).all(-1) & np.isin(range(len(SIDES)), legs)
     if not keep.any():
-        raise SpringfootError(f"{recording.policy} walks no strides after {WARM_UP:g} s whose springs could be found")
+        raise SpringfootError(f"{recording.policy} walks no strides whose springs could be found, where it is measured")
     torque = series["torque"][..., FEET]
     segment = (phase[keep] * COURSE).astype(int)
     count = np.maximum(np.bincount(segment, minlength=COURSE), 1)  # 1 where there are no samples: the sum is 0

@@ -60,6 +60,9 @@ TRAIN = [
     (["--seed", "None"], "--seed must be a whole number, got 'None'"),
     (["--learning-rate", "fast"], "--learning-rate must be a number, got 'fast'"),
     (["--out"], "--out needs a value"),
+    (["--seeds", "2", "--device", "cuda"], "--seeds trains on the CPU; drop --device"),
+    (["--engine", "rllib", "--device", "cuda"], "--engine rllib learns on the CPU; drop --device cuda, or --engine"),
+    (["--engine", "rllib", "--critic-steps", "9"], "--engine rllib trains actor and critic together; drop --critic-steps, or --engine"),
 ]
 POLICIES = (
     "give a .safetensors or .onnx file, a run folder, a schedule in a .csv or .json file, module:function, frozen:POLICY, "

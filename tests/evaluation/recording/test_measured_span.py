@@ -7,6 +7,7 @@ from springfoot.envs.settings.settings import BipedSettings, body_of
 from springfoot.evaluation.numbers.tally import tally_strides
 from springfoot.evaluation.recording.recording import TICK, WARM_UP, Recording, record
 from springfoot.evaluation.report.animation import clip_of
+from springfoot.studies.springs.any_stiffness import mean_springs
 from springfoot.studies.springs.push_experiment import samples
 
 
@@ -30,6 +31,13 @@ def test_numbers_pictures_and_springs_begin_where_a_walk_from_standing_is_steady
     assert len(samples(recording).phase) == 2 * (recording.ticks[0] - recording.measured_ticks.start)  # of two legs
     strides = tally_strides(recording).stride_time
     assert sum(strides) / 2 <= 12.0 - begin < sum(strides) / 2 + 2 * max(strides)
+
+
+def test_mean_springs_take_nothing_from_before():
+    recording = walk(start="standing")
+    springs = mean_springs(recording)
+    recording.series["stiffness"][:, : recording.measured_ticks.start] = 1e3
+    np.testing.assert_array_equal(mean_springs(recording).stiffness, springs.stiffness)
 
 
 def test_a_walk_that_stops_is_measured_until_then():
