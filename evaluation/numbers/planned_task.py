@@ -1,4 +1,4 @@
-"""Measure how a walk does its plan's task, and what it costs the legs: effort, impact, and errors of the task."""
+"""Measure how a walk does its plan's task, and its price for the legs: effort, impact, and errors of the task."""
 
 import numpy as np
 
