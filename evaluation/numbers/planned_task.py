@@ -56,6 +56,6 @@ def effort_and_impact(
         "place": float(np.mean(places)),
         "skipped": (1.0 - float(np.mean(landings))) * 2 * biped.plan.step_length,
         "travel": float(np.mean(tally.travel)),
-        "unsteady": float(np.sqrt(np.mean(tally.both.sd("grf_vertical_bw") ** 2))),
+        "unsteady": tally.unsteady,
     }
     return effort, float(np.mean(impacts)), task_errors

@@ -27,6 +27,7 @@ from .series import (
     foot_contacts,
     mean_speed,
     mid_tick,
+    step_lengths,
     stride_curves,
     strides_within,
 )
@@ -93,6 +94,12 @@ class StrideTally:
     """Distance the loaded sole slides in each stance [m]."""
     clearance: list[float] = field(default_factory=list)
     """Least height of ball and toe in the middle of each swing [m]."""
+
+    @property
+    def unsteady(self) -> float:
+        """Return the standard deviation of the vertical force over the strides of both feet, root mean square over the
+        stride [body weights]."""
+        return float(np.sqrt(np.mean(self.both.sd("grf_vertical_bw") ** 2)))
 
 
 def tally_strides(recording: Recording, muscle: Muscle = AS_IS) -> StrideTally:
@@ -196,10 +203,7 @@ def _add_steps(
         cop = _centre_of_pressure(series) - mid_tick(series["ankle"][:, side, 0])
         tally.cop.add(on_percent(cop[:, None], begin, end, TICK, first=TICK / 2))
         tally.reward.add(on_percent(series[REWARD], begin, end, TICK, first=TICK))
-        # Step length: x of the other foot, which lands at the step's end, less x of this foot at the step's start.
-        begin_tick, end_tick = np.floor(np.stack([begin, end]) / TICK).astype(int)
-        ankle_x = series["ankle"][..., 0]
-        tally.step_length += list(ankle_x[end_tick, 1 - side] - ankle_x[begin_tick, side])
+        tally.step_length += list(step_lengths(series["ankle"][..., 0], steps[sides == side], sides[sides == side]))
         tally.step_time += list(end - begin)
         tally.step_sides += [1 - side] * len(begin)
         # The trailing foot leaves the ground within this step; without such a toe-off the body was in flight.

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
         record_feet,
         record_policies,
         record_walk,
+        recorded_steps,
     )
 
 __all__ = [
@@ -36,6 +37,7 @@ __all__ = [
     "record_feet",
     "record_policies",
     "record_walk",
+    "recorded_steps",
 ]
 
 if not TYPE_CHECKING:  # a type checker would take it to mean that any name exists
@@ -56,5 +58,6 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
             "record_feet": "recording",
             "record_policies": "recording",
             "record_walk": "recording",
+            "recorded_steps": "recording",
         },
     )

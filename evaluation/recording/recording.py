@@ -1,6 +1,6 @@
 """Record episodes of a policy as 100 Hz series, from which all numbers and pictures of an evaluation are computed."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import ceil, isfinite
 from pathlib import Path
@@ -14,7 +14,7 @@ from springfoot.agents.policies.baselines import PolicyFunction
 from springfoot.arrays import NDArray
 from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.batch.step_result import INFO, Tick
-from springfoot.envs.batch.walk import walked_steps
+from springfoot.envs.batch.walk import Walked, walked_steps
 from springfoot.envs.control.constants import LegConstants
 from springfoot.envs.control.reference_walk import reference_walk_at
 from springfoot.envs.control.standing import steady_walk
@@ -355,16 +355,19 @@ class Episodes:
     tick."""
     length: int
     """Most ticks of an episode."""
+    names: Collection[str] = tuple(SERIES)
+    """Names of the series that are kept."""
 
     @classmethod
-    def empty(cls, count: int, length: int) -> "Episodes":
-        """Return room for `count` episodes of at most `length` ticks."""
+    def empty(cls, count: int, length: int, names: Collection[str] = tuple(SERIES)) -> "Episodes":
+        """Return room for `count` episodes of at most `length` ticks: for their reward, and the series `names`."""
         return cls(
             ticks=np.zeros(count, int),
             returns=np.zeros(count),
             fall_reason=np.full(count, "", dtype="U64"),
             series={REWARD: np.full((count, length, len(TERMS)), np.nan, np.float32)},
             length=length,
+            names=names,
         )
 
     @classmethod
@@ -390,15 +393,16 @@ class Episodes:
         return {name: values[index, : self.ticks[index]].astype(float) for name, values in self.series.items()}
 
 
-def record_walk(
+def recorded_steps(
     biped: Biped,
     act: PolicyFunction,
     kept: Episodes,
     rows: slice = slice(None),
     steps: int | None = None,
-    progress: Callable[[float], object] = lambda seconds: None,
-) -> None:
-    """Walk one episode in each environment of a batch, and write every tick into the series of `kept`.
+    on_tick: Callable[[Tick], object] = lambda tick: None,
+) -> Iterator[Walked]:
+    """Walk one episode in each environment of a batch, write every tick into the series of `kept`, and yield after each
+    step.
 
     All measurements of walks start from these series.
 
@@ -408,32 +412,48 @@ def record_walk(
         kept: room for episodes, which is filled.
         rows: episodes of `kept` that are walked, one for each environment.
         steps: most steps to walk; None for episodes of the settings' length.
-        progress: called after every step with the seconds that it simulated.
+        on_tick: called after every tick, once it is written.
     """
     ticks = kept.ticks[rows]
 
     def keep(tick: Tick) -> None:
-        """Write the tick's values into all series, which the first tick creates; NaN for episodes that have ended."""
+        """Write the tick's values into the series, which the first tick creates; NaN for episodes that have ended."""
         index = int(ticks.max())  # episodes begin together: the longest one has no gap
-        for name, take in SERIES.items():
-            value = take(tick)
+        for name in kept.names:
+            value = SERIES[name](tick)
             if name not in kept.series:
                 kept.series[name] = np.full((len(kept.ticks), kept.length, *value.shape[1:]), np.nan, np.float32)
             walking = tick.active.reshape(-1, *[1] * (value.ndim - 1))  # (N, 1, ...), as the value
             kept.series[name][rows, index] = np.where(walking, value, np.nan)
         ticks[:] += tick.active
+        on_tick(tick)
 
     biped.on_tick = keep
     first = 0  # tick at which the step begins; `last` is that of the next step
-    for active, result in walked_steps(biped, act, steps):
+    for walked in walked_steps(biped, act, steps):
+        active, result = walked
         last = int(ticks.max())
         kept.series[REWARD][rows, first:last][active] = result.values[active, None, _TERMS]
         kept.returns[rows][active] += result.reward[active]
         fell = active & result.terminated
         kept.fall_reason[rows][fell] = result.reasons[fell]
-        progress(float(active.sum()) * biped.dt)
         first = last
+        yield walked
     biped.on_tick = None
+
+
+def record_walk(
+    biped: Biped,
+    act: PolicyFunction,
+    kept: Episodes,
+    rows: slice = slice(None),
+    steps: int | None = None,
+    progress: Callable[[float], object] = lambda seconds: None,
+) -> None:
+    """Walk the episodes of `recorded_steps` to their end; call `progress` after every step with the seconds that it
+    simulated."""
+    for active, _ in recorded_steps(biped, act, kept, rows, steps):
+        progress(float(active.sum()) * biped.dt)
 
 
 def record_all(

@@ -21,7 +21,7 @@ from springfoot.envs.control import FED, SLOW_SPEED, LegConstants
 from springfoot.envs.settings import BipedSettings
 from springfoot.evaluation.numbers import LATE_SWING_PERCENT, StrideTally
 from springfoot.evaluation.recording import planned_course
-from springfoot.gait.people import PERCENT, HumanGait, force_features, stride_work
+from springfoot.gait.people import PERCENT, HumanGait, correlation, force_features, stride_work
 
 from .leg_walks import FOREIGN, Walks, foreign_springs, measured, walk
 from .walk_effort import effort_price
@@ -246,13 +246,13 @@ def misses(tally: StrideTally, biped: Biped) -> NDArray:
     off["peak_moment"] = _excess(peak_moment, ALLOWED["peak_moment"])
     work = np.abs(np.mean(tally.joint_work, axis=0))  # (joint, positive and negative), mean over strides
     off["work"] = _excess(work[: len(target_work)] - target_work, ALLOWED["work"])
-    ankle_r = np.corrcoef(mean["ankle"], target_mean["ankle"])[0, 1]
+    ankle_r = correlation(mean["ankle"], target_mean["ankle"]) or 0.0  # None for an ankle that does not move
     off["ankle_r"] = max(LEAST_ANKLE_R - ankle_r, 0.0)
     off["effort"] = max(work[:, 0].sum() - MOST_WORK * target_work[:, 0].sum(), 0.0)
     force_peak = np.array(tally.vertical_max) - target_mean["grf_vertical"].max()
     off["force_peak"] = np.mean(np.maximum(force_peak - ALLOWED["force_peak"], 0.0))
     off["travel"] = np.mean(tally.travel)
-    off["unsteady"] = np.sqrt(np.mean(both.sd("grf_vertical_bw") ** 2))
+    off["unsteady"] = tally.unsteady
     return np.concatenate([np.ravel(value) / TOLERANCE[name] for name, value in off.items()])
 
 

@@ -8,20 +8,19 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise, product
 from math import ceil
-from typing import NamedTuple
 
 import mujoco
 import numpy as np
 
 from springfoot.agents.policies import PolicyFunction, leg_phase
 from springfoot.arrays import NDArray
-from springfoot.envs.batch import Biped, Tick, walked_steps
+from springfoot.envs.batch import Biped, Tick
 from springfoot.envs.control import FEET, PLATEAUS, TOE_OFF, stiffness_ranges
 from springfoot.envs.physics import JOINTS, LEFT, RIGHT, SIDES
 from springfoot.envs.settings import BipedSettings
 from springfoot.errors import SpringfootError
-from springfoot.evaluation.numbers import foot_contacts
-from springfoot.evaluation.recording import TICK, WARM_UP
+from springfoot.evaluation.numbers import foot_contacts, step_lengths
+from springfoot.evaluation.recording import TICK, WARM_UP, Episodes, recorded_steps
 from springfoot.gait.body import Body
 from springfoot.gait.people import (
     LOADING_END_PERCENT,
@@ -44,6 +43,8 @@ DURATIONS = ("one stride", "every stride")
 """Duration of the change: the left leg's first stride alone, or all strides of both legs from then on."""
 SLOWEST_STRIDE = 2.5
 """Longest mean stride for which a walk has time to complete its strides [s]."""
+SERIES = ("com", "com_velocity", "ankle", "force", "phase")
+"""Series that are recorded: all of them, of 25 walks for each seed, would fill the memory."""
 PHASE_LAG = 0.1
 """Longest time between a foot's first load and the new start of its leg's phase [s]."""
 FIXED = ("torque_Nm", "forward_m_s2", "upward_m_s2", "forward_m_s", "upward_m_s")
@@ -152,7 +153,7 @@ def paired_walks(
     biped = Biped(settings, copies * num, threads)
     biped.reset(np.arange(copies * num), list(seeds) * copies)
     changes = _Changes(action_step(settings, biped.body, change), num)
-    record = _Record(biped, change, num)
+    samples = _Samples(biped, change, num)
     previous_phase = np.zeros((copies * num, len(SIDES)))
     stride = np.full(copies * num, -1)  # of the left foot; 0 begins at its first heel strike after the warm-up
     changed, cut = np.zeros((2, copies), int)  # changed actions, and those that the range of the actions cuts
@@ -168,7 +169,7 @@ def paired_walks(
         if steps * biped.dt >= WARM_UP:
             stride[:] += phase[:, LEFT] < previous_phase[:, LEFT]
         previous_phase[:] = phase
-        record.stride = stride[:num]  # of the unchanged walks, the first ones; the record reads it in this step's ticks
+        samples.stride = stride[:num]  # of the unchanged walks, the first ones, in this step's ticks
         added = changes.added(phase, stride)
         action = policy(observation) + added
         changed[:] += (added != 0.0).reshape(copies, -1).sum(1)
@@ -177,7 +178,8 @@ def paired_walks(
 
     stood = np.ones(copies * num, bool)
     longest = ceil((WARM_UP + SLOWEST_STRIDE * (strides + 1)) / biped.dt)
-    for active, result in walked_steps(biped, act, longest):
+    kept = Episodes.empty(copies * num, longest * biped.windows_per_step, SERIES)
+    for active, result in recorded_steps(biped, act, kept, steps=longest, on_tick=samples.take):
         steps += 1
         stood = active & ~result.terminated
         progress(float(stood.sum()) * biped.dt)
@@ -189,7 +191,7 @@ def paired_walks(
             f"of {num} unchanged walks fewer than two stay up: changed walks have nothing to be compared with"
         )
     changed, cut = (of_copies[1:].reshape(len(CELLS), -1).sum(1) for of_copies in (changed, cut))
-    return record.paired(strides, stood, cut / np.maximum(changed, 1))
+    return _paired(kept, samples, biped.body, strides, stood, cut / np.maximum(changed, 1))
 
 
 class _Changes:
@@ -221,59 +223,22 @@ class _Changes:
         return ((due & (phase >= self._begin) & (phase < self._end))[..., None] * self._step).reshape(len(phase), -1)
 
 
-class _Series(NamedTuple):
-    """Quantities of N walks, of which the first S are unchanged, at one tick, or at T ticks with a first axis T."""
-
-    com: NDArray
-    """(N, (x, z)) position of the CoM [m]."""
-    velocity: NDArray
-    """(N,) forward velocity of the CoM [m/s]."""
-    ankle: NDArray
-    """(N, side) forward position of the ankles [m]."""
-    load: NDArray
-    """(N, side) vertical force on each foot [N]."""
-    phase: NDArray
-    """(S,) phase of the left leg."""
-    stride: NDArray
-    """(S,) stride of the left foot, 0 the first, -1 before."""
-
-
-class _Record:
-    """Record of the walks at every tick of 10 ms; the first S walks are unchanged.
-
-    It is no `record_walk`: all series of 25 walks for each seed would fill the memory, and changes are sampled at
-    ticks, which `record_walk` keeps to itself.
-    """
+class _Samples:
+    """Samples of the effects that the changes have at the states of the S unchanged walks, at every tick of 10 ms."""
 
     def __init__(self, biped: Biped, change: float, num: int):
         self.stride = np.full(num, -1)
         """(S,) stride of each unchanged walk, set before each step; 0 is the first."""
+        self.strides: list[NDArray] = []
+        """The same at every tick so far."""
+        self.sums = np.zeros((len(CELLS), num, 4))
+        """(C, S, 4) number of samples; their sums of torque [N m] and acceleration (x, z) [m/s^2]."""
         self._biped = biped
         self._change = change
-        self._num = num
-        self._ticks: list[_Series] = []
-        self._samples = np.zeros(
-            (len(CELLS), num, 4)
-        )  # number of samples; sums of torque [N m], acceleration (x, z) [m/s^2]
-        biped.on_tick = self._keep
 
-    def _keep(self, tick: Tick) -> None:
-        """Append a tick's `_Series`: all walks' positions and forces, phase and stride of the unchanged ones.
-
-        In their first stride also compute the effect of each change on the present state (`_sample`).
-        """
-        m = tick.measurement
-        unchanged = slice(self._num)  # they come first
-        self._ticks.append(
-            _Series(
-                com=m.com.copy(),
-                velocity=m.com_velocity[:, 0].copy(),
-                ankle=m.ankle[..., 0].copy(),
-                load=m.force[..., 1].sum(-1),
-                phase=tick.phase[unchanged, LEFT].copy(),
-                stride=self.stride.copy(),
-            )
-        )
+    def take(self, tick: Tick) -> None:
+        """Keep the tick's strides; in an unchanged walk's first stride, also sample the effect of each change."""
+        self.strides.append(self.stride.copy())
         for index in np.flatnonzero(self.stride == 0).tolist():
             self._sample(index, tick.phase[index])
 
@@ -284,49 +249,54 @@ class _Record:
         for cell, (joint, name) in enumerate(CELLS):
             begin, end = PHASES[name]
             for side in np.flatnonzero((phase >= begin) & (phase < end)):
-                self._samples[cell, index] += 1.0, -torque[side, joint], *acceleration[side, joint]
+                self.sums[cell, index] += 1.0, -torque[side, joint], *acceleration[side, joint]
 
-    def paired(self, strides: int, finished: NDArray, cut: NDArray) -> PairedWalks:
-        """Return the differences of each changed walk from the unchanged walk of its seed.
 
-        `strides` is the number of strides, `finished` (N,) True for walks that completed them, `cut` as in
-        `PairedWalks`.
-        """
-        series = _Series(*(np.stack(ticks) for ticks in zip(*self._ticks, strict=True)))
-        # Movement of each walk; the unchanged ones come first, and their mean strides are the clock of all.
-        movement = np.full((len(finished), strides, len(MOVEMENT)), np.nan)
-        clocks = np.zeros((self._num, strides))
-        for index in range(len(finished)):
-            seed = index % self._num
-            first_stride = TICK * np.argmax(series.stride[:, seed] == 0)
-            contacts = foot_contacts(series.load[:, index], self._biped.body)
-            landed = contacts[LEFT].heel_strikes
-            landed = landed[landed > first_stride - PHASE_LAG][: strides + 1]
-            if not finished[index] or len(landed) <= strides:
-                continue
-            if index == seed:
-                clocks[seed] = np.linspace(landed[0], landed[-1], strides + 1)[1:]
-            com = series.com[:, index]
-            movement[index] = _movement(com, series.ankle[:, index], contacts, landed, clocks[seed])
-        movement = movement.reshape(-1, self._num, *movement.shape[1:])  # (copies, S, K, len(MOVEMENT))
-        # Velocity of all copies of a seed when each phase of its unchanged first stride ends.
-        ends = np.stack([_phase_ends(*of_seed) for of_seed in zip(series.phase.T, series.stride.T, strict=True)], -1)
-        velocity = series.velocity.reshape(len(series.velocity), -1, self._num)  # (T, copies, S)
-        at_ends = velocity[ends, :, np.arange(self._num)]  # (phases, S, copies)
-        # Copy 0 is unchanged, copy 1 + len(DURATIONS) x cell + duration has that change.
-        one_stride = 1 + np.arange(len(CELLS)) * len(DURATIONS)  # copy with each cell's change of one stride
-        phase_index = [list(PHASES).index(name) for _, name in CELLS]
-        complete = np.isfinite(movement[0]).all((1, 2))  # seeds whose unchanged walk is finished, a step in each stride
-        # Means over the samples, and the acceleration's integral over the phase of one leg.
-        counts, sums = np.split(self._samples, [1], axis=-1)
-        mean = sums / np.where(complete[:, None], counts, np.nan)
-        return PairedWalks(
-            fixed=np.concatenate([mean, mean[..., 1:] * counts * TICK / len(SIDES)], -1),
-            velocity=np.where(complete, at_ends[phase_index, :, one_stride] - at_ends[phase_index, :, 0], np.nan),
-            movement=(movement[1:] - movement[0]).reshape(len(CELLS), len(DURATIONS), *movement.shape[1:]),
-            unchanged=movement[0],
-            cut=cut,
-        )
+def _paired(
+    kept: Episodes, samples: _Samples, body: Body, strides: int, finished: NDArray, cut: NDArray
+) -> PairedWalks:
+    """Return the differences of each changed walk from the unchanged walk of its seed.
+
+    `kept` are the N walks, the unchanged ones first, `strides` is the number of strides, `finished` (N,) True for walks
+    that completed them, `cut` as in `PairedWalks`.
+    """
+    stride = np.stack(samples.strides)  # (T, S)
+    num = stride.shape[1]
+    # Movement of each walk; the unchanged ones come first, and their mean strides are the clock of all.
+    movement = np.full((len(finished), strides, len(MOVEMENT)), np.nan)
+    clocks = np.zeros((num, strides))
+    for index in np.flatnonzero(finished).tolist():
+        seed = index % num
+        first_stride = TICK * np.argmax(stride[:, seed] == 0)
+        series = kept.episode(index)
+        contacts = foot_contacts(series["force"][..., 1].sum(2), body)
+        landed = contacts[LEFT].heel_strikes
+        landed = landed[landed > first_stride - PHASE_LAG][: strides + 1]
+        if len(landed) <= strides:
+            continue
+        if index == seed:
+            clocks[seed] = np.linspace(landed[0], landed[-1], strides + 1)[1:]
+        movement[index] = _movement(series["com"], series["ankle"][..., 0], contacts, landed, clocks[seed])
+    movement = movement.reshape(-1, num, *movement.shape[1:])  # (copies, S, K, len(MOVEMENT))
+    # Velocity of all copies of a seed when each phase of its unchanged first stride ends.
+    phase = kept.series["phase"][:num, : len(stride), LEFT]  # (S, T)
+    ends = np.stack([_phase_ends(*of_seed) for of_seed in zip(phase, stride.T, strict=True)])  # (S, phases)
+    velocity = kept.series["com_velocity"][..., 0].reshape(-1, num, kept.length).astype(float)  # (copies, S, length)
+    at_ends = np.take_along_axis(velocity, ends[None], 2)  # (copies, S, phases)
+    # Copy 0 is unchanged, copy 1 + len(DURATIONS) x cell + duration has that change.
+    one_stride = 1 + np.arange(len(CELLS)) * len(DURATIONS)  # copy with each cell's change of one stride
+    phase_index = [list(PHASES).index(name) for _, name in CELLS]
+    complete = np.isfinite(movement[0]).all((1, 2))  # seeds whose unchanged walk is finished, a step in each stride
+    # Means over the samples, and the acceleration's integral over the phase of one leg.
+    counts, sums = np.split(samples.sums, [1], axis=-1)
+    mean = sums / np.where(complete[:, None], counts, np.nan)
+    return PairedWalks(
+        fixed=np.concatenate([mean, mean[..., 1:] * counts * TICK / len(SIDES)], -1),
+        velocity=np.where(complete, at_ends[one_stride, :, phase_index] - at_ends[0, :, phase_index], np.nan),
+        movement=(movement[1:] - movement[0]).reshape(len(CELLS), len(DURATIONS), *movement.shape[1:]),
+        unchanged=movement[0],
+        cut=cut,
+    )
 
 
 def _phase_ends(phase: NDArray, stride: NDArray) -> list[int]:
@@ -345,13 +315,11 @@ def _movement(com: NDArray, ankle: NDArray, contacts: list[Contacts], landed: ND
     """
     com_at_strikes = sample(com[:, 0], landed, TICK, TICK)
     speed = np.diff(com_at_strikes) / np.diff(landed)
-    # A step goes from one ankle at its beginning to the other ankle at its end.
     times, side = find_steps(contacts[LEFT], contacts[RIGHT], landed[0])
-    ankles = sample(ankle, times, TICK, TICK)  # (steps, (begin, end), side)
-    length = np.take_along_axis(ankles[:, 1], 1 - side[:, None], 1) - np.take_along_axis(ankles[:, 0], side[:, None], 1)
+    length = step_lengths(ankle, times, side)
     stride = np.searchsorted(landed, times[:, 0], side="right") - 1
     # Sum and number of the steps that begin in each stride.
-    total, count = (np.bincount(stride, weights, len(landed))[: len(clock)] for weights in (length[:, 0], None))
+    total, count = (np.bincount(stride, weights, len(landed))[: len(clock)] for weights in (length, None))
     with np.errstate(invalid="ignore"):  # a stride without a whole step has NaN
         step_length = total / count
     height = on_percent(com[:, 1], landed[:-1], landed[1:], TICK, TICK).mean(1)
