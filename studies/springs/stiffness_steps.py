@@ -43,7 +43,7 @@ DURATIONS = ("one stride", "every stride")
 """Duration of the change: the left leg's first stride alone, or all strides of both legs from then on."""
 SLOWEST_STRIDE = 2.5
 """Longest mean stride for which a walk has time to complete its strides [s]."""
-SERIES = ("com", "com_velocity", "ankle", "force", "phase")
+PAIRED_SERIES = ("com", "com_velocity", "ankle", "force", "phase")
 """Series that are recorded: all of them, of 25 walks for each seed, would fill the memory."""
 PHASE_LAG = 0.1
 """Longest time between a foot's first load and the new start of its leg's phase [s]."""
@@ -178,7 +178,7 @@ def paired_walks(
 
     stood = np.ones(copies * num, bool)
     longest = ceil((WARM_UP + SLOWEST_STRIDE * (strides + 1)) / biped.dt)
-    kept = Episodes.empty(copies * num, longest * biped.windows_per_step, SERIES)
+    kept = Episodes.empty(copies * num, longest * biped.windows_per_step, PAIRED_SERIES)
     for active, result in recorded_steps(biped, act, kept, steps=longest, on_tick=samples.take):
         steps += 1
         stood = active & ~result.terminated

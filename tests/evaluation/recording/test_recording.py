@@ -3,8 +3,17 @@
 import numpy as np
 import pytest
 
+from springfoot.envs.batch.biped_batch import Biped
 from springfoot.evaluation.recording.policies import policy_and_settings
-from springfoot.evaluation.recording.recording import BATCH, load_recording, record, record_policies
+from springfoot.evaluation.recording.recording import (
+    BATCH,
+    REWARD,
+    Episodes,
+    load_recording,
+    record,
+    record_policies,
+    recorded_steps,
+)
 from springfoot.gait import SpringfootError
 
 
@@ -33,6 +42,23 @@ def test_policies_side_by_side_walk_as_each_alone_in_every_batch():
         assert one.seed == 8 and one.returns == alone.returns[3]
         np.testing.assert_array_equal(one.shown()["angle"], alone.series["angle"][3])
     assert len({recording.series["torque"].tobytes() for recording in together}) == 3
+
+
+def test_a_walk_that_is_ended_early_keeps_the_series_asked_for_and_shows_every_tick():
+    policy, settings = policy_and_settings("schedule", {"episode_seconds": 1.0})
+    whole = record(policy, settings, name="schedule", episodes=2)
+    biped = Biped(settings, 2)
+    biped.reset(np.arange(2), [0, 1])
+    kept = Episodes.empty(2, 100, ("com", "force"))
+    seen = []
+    for number, _ in enumerate(recorded_steps(biped, policy, kept, on_tick=seen.append), start=1):
+        if number == 20:
+            break
+    assert set(kept.series) == {"com", "force", REWARD}
+    assert kept.ticks.tolist() == [40, 40] and len(seen) == 40
+    for name, values in kept.series.items():
+        np.testing.assert_array_equal(values[:, :40], whole.series[name][:, :40])
+        assert np.isnan(values[:, 40:]).all()
 
 
 def test_a_recording_is_of_one_body_at_one_speed():
