@@ -9,11 +9,10 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import permutations
 from pathlib import Path
-from typing import Annotated, Any, ClassVar
+from typing import Any, ClassVar
 
 import matplotlib
 import numpy as np
-import tyro
 from matplotlib.figure import Figure
 
 from springfoot.evaluation.numbers import measure
@@ -22,7 +21,7 @@ from springfoot.evaluation.report import STYLE
 from springfoot.files.markdown import MISSING, table
 
 from ..base.kept import Kept
-from ..base.study import Answer, OnProgress, WalkingStudy
+from ..base.study import Answer, OnProgress, PersonsStudy
 from .foot_numbers import FOOT_NUMBERS, numbers_of
 from .walked_speeds import ASKED_SPEEDS, TWO_PRICES, WALKED_SPEEDS, Row, at_walked_speeds, lowest, rows_csv
 
@@ -30,21 +29,12 @@ COLORS = ("#0b6e8f", "#c26a1b", "#7a5195", "#4a8f3c", "#555555")
 
 
 @dataclass(frozen=True, kw_only=True)
-class SpringMap(WalkingStudy):
+class SpringMap(PersonsStudy):
     """Walk persons with every spring in every case; a subclass says which springs and cases."""
 
-    policies: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="POLICY ...")] = ("learned",)
-    """Persons that adapt to the feet: run folders, files, `learned` or `learned-2`."""
     beside: str | None = "pretrained"
     """Policy that does not adapt, walked beside them; None for none."""
-    episodes: int = 5
-    """Episodes of each spring, case and commanded speed."""
-    seconds: float = 12.0
-    """Length of each episode."""
-    keep: Annotated[Path | None, tyro.conf.arg(metavar="FILE")] = None
-    """File in which the numbers of each policy, case and speed are kept, to go on after a stop."""
 
-    QUICK: ClassVar[Mapping[str, Any]] = {"episodes": 1, "seconds": 6.0, "keep": None}
     CASE: ClassVar[str]
     """Name of the quantity that makes a case, with its unit."""
     CASES: ClassVar[Sequence[float]]
@@ -65,7 +55,7 @@ class SpringMap(WalkingStudy):
     @property
     def walkers(self) -> tuple[str, ...]:
         """Return all policies: the persons, and the one that does not adapt."""
-        return self.policies if self.beside is None else (*self.policies, self.beside)
+        return self.persons if self.beside is None else (*self.persons, self.beside)
 
     @property
     def total(self) -> float:
@@ -130,7 +120,7 @@ class SpringMap(WalkingStudy):
 
     def _text(self, walks: Sequence[Row], best: Sequence[Row]) -> str:
         """Return the report from rows of `_walks` and of `best_springs`: a picture, a table and sentences."""
-        groups = {"": self.policies, f", {self.beside} (not adapted)": self.walkers[len(self.policies) :]}
+        groups = {"": self.persons, f", {self.beside} (not adapted)": self.walkers[len(self.persons) :]}
         parts = [
             "![Fibre work over the stiffness of the spring](map.png)",
             best_table(best, groups, f"{self.CASE}; best spring, {self.UNIT} (worst spring)"),
@@ -161,8 +151,8 @@ class SpringMap(WalkingStudy):
                     for policy in self.walkers:
                         rows = [r for r in even if (r["policy"], r["case"], r["speed_m_s"]) == (policy, case, speed)]
                         walked = [(row["spring"], row[TWO_PRICES[0]]) for row in rows if row[TWO_PRICES[0]] is not None]
-                        adapts = policy in self.policies
-                        label = f"{case:g}" if policy == self.policies[0] else None
+                        adapts = policy in self.persons
+                        label = f"{case:g}" if policy == self.persons[0] else None
                         ax.plot(*np.reshape(walked, (-1, 2)).T, "o-", ms=3.5, lw=1.3, color=color, label=label)
                         ax.lines[-1].set(alpha=1.0 if adapts else 0.35, linestyle="-" if adapts else ":")
                 ax.set(title=f"walking {speed:g} m/s", xlabel=f"spring ({self.UNIT})")
