@@ -192,10 +192,15 @@ def stance_series(values: NDArray, toe_off: float) -> list[float]:
 
     Returns b_k of sum b_k sin(k pi phase / toe_off), k from 1. Values after the stride phase `toe_off` do not count.
     """
-    phase = np.linspace(0, 1, len(values))
+    return np.round(stance_coefficients(values, np.linspace(0, 1, len(values)), toe_off), DIGITS).tolist()
+
+
+def stance_coefficients(values: NDArray, phase: NDArray, toe_off: float) -> NDArray:
+    """Fit the sine series of `stance_series` to N values (N,) at stride phases `phase` (N,): return its (STANCE_TERMS,)
+    coefficients."""
     inside = phase < toe_off
     basis = np.sin(np.pi / toe_off * np.outer(phase[inside], np.arange(1, STANCE_TERMS + 1)))
-    return np.round(np.linalg.lstsq(basis, values[inside], rcond=None)[0], DIGITS).tolist()
+    return np.linalg.lstsq(basis, values[inside], rcond=None)[0]
 
 
 def human_gait(speed: float, height: float = REFERENCE_HEIGHT, people: str | Path = PEOPLE_FILE) -> HumanGait:

@@ -6,7 +6,7 @@ from springfoot.arrays import NDArray
 
 from ..body.body import ANGLES, GRAVITY
 from ..body.leg_dynamics import JOINTS, LEG_SEGMENTS, inverse_dynamics
-from ..people.human import HARMONICS, STANCE_TERMS, FootHabits, HumanGait
+from ..people.human import HARMONICS, FootHabits, HumanGait, stance_coefficients
 from .kinetics import foot_force, planned_leg
 from .plan import WalkPlan
 
@@ -44,7 +44,7 @@ def gait_of(plan: WalkPlan) -> HumanGait:
     force = force / (body.total_mass * GRAVITY)
     toe_off = plan.feet.toe_off
     mean["grf_forward"], mean["grf_vertical"] = (
-        _stance_coefficients(force[:, axis], phase, toe_off) for axis in range(2)
+        stance_coefficients(force[:, axis], phase, toe_off) for axis in range(2)
     )
     return HumanGait(
         speed=plan.speed,
@@ -93,11 +93,3 @@ def _fourier_coefficients(values: NDArray) -> NDArray:
     series = np.fft.rfft(values)[: HARMONICS + 1] / len(values)
     series[1:] *= 2  # each term stands for its negative frequency too, the mean for itself
     return series
-
-
-def _stance_coefficients(values: NDArray, phase: NDArray, toe_off: float) -> NDArray:
-    """Fit a sine series over stance to samples over `phase` by least squares: return its (STANCE_TERMS,)
-    coefficients."""
-    inside = phase < toe_off
-    basis = np.sin(np.pi / toe_off * np.outer(phase[inside], np.arange(1, STANCE_TERMS + 1)))
-    return np.linalg.lstsq(basis, values[inside], rcond=None)[0]
