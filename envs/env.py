@@ -201,7 +201,8 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
     | `mass`                    | `63.0`          | body mass [kg]                                                     |
     | `leg_ratio`               | `1.0`           | thigh and shank over the average at that height, trunk the rest    |
     | `foot_ratio`              | `1.0`           | length of the foot over the average at that height                 |
-    | `carried_ratio`           | `0.0`           | mass of a load on the back over body mass                          |
+    | `carried_ratio`           | `0.0`           | mass of a load over body mass                                      |
+    | `carried_at`              | `"back"`        | place of the load: back, or waist                                  |
     | `height_range`            | `None`          | heights drawn at each reset [m], in place of `height`              |
     | `mass_range`              | `None`          | body masses drawn at each reset [kg], in place of `mass`           |
     | `drawn_bodies`            | `None`          | proportions, loads drawn at each reset; see Starting state         |

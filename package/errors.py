@@ -85,3 +85,9 @@ def require_count(name: str, value: object, least: int = 1, most: int = MOST_COU
         given = "infinity" if isinf(as_float(value)) else quoted(value)
         raise SpringfootError(f"{name} must be a whole number {bounds}, got {given}")
     return count
+
+
+def require_choice(name: str, value: object, choices: tuple[str, ...]) -> None:
+    """Raise `SpringfootError` for a value that is not in `choices`."""
+    if not isinstance(value, str) or value not in choices:
+        raise SpringfootError(f"{name} must be one of {', '.join(map(repr, choices))}, got {quoted(value)}")

@@ -254,10 +254,11 @@ def build_model(
 
 
 def _load(trunk: "mujoco.MjsBody", body: Body) -> None:
-    """Add the body's load: a box on the back, fixed to the trunk."""
+    """Add the body's load, fixed to the trunk: a box on the back, or a belt around the waist."""
     forward, up = body.carried_com
     load = _segment(trunk, "load", (forward, 0, up), body.carried_mass, (0, 0), body.carried_inertia)
-    size = np.array([0.075, 0.15, 0.25]) * body.length_scale  # half-lengths: forward, sideways, up
+    half_lengths = {"back": (0.075, 0.15, 0.25), "waist": (0.13, 0.17, 0.05)}  # forward, sideways, up
+    size = np.array(half_lengths[body.carried_at]) * body.length_scale
     box(load, size, visible=body.carried_ratio > 0.0)
 
 

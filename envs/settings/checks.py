@@ -108,12 +108,6 @@ def is_number(value: Any) -> bool:
     return isfinite(as_float(value))
 
 
-def check_choice(name: str, value: Any, choices: tuple[str, ...]) -> None:
-    """Refuse a value that is not in `choices`."""
-    if not isinstance(value, str) or value not in choices:
-        raise SpringfootError(f"{name} must be one of {', '.join(map(repr, choices))}, got {quoted(value)}")
-
-
 def check_range(name: str, value: Any, unit: str) -> None:
     """Refuse any value but a tuple (low, high) of finite numbers with 0 < low < high."""
     numbers = isinstance(value, tuple) and len(value) == 2 and all(map(is_number, value))

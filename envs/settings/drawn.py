@@ -8,11 +8,10 @@ from typing import Any, Literal, TypeVar, get_args
 
 import numpy as np
 
-from springfoot.errors import SpringfootError, as_float, quoted, require_number
+from springfoot.errors import SpringfootError, as_float, quoted, require_choice, require_number
 from springfoot.gait.body.body import Body
 
 from ..physics.foot import Foot
-from .checks import check_choice
 from .feet import ENGAGES, TABLES, FootSetting, foot_setting
 
 On = Literal["one", "both", "left", "right"]
@@ -84,7 +83,7 @@ def drawn_feet_setting(value: Any) -> tuple[DrawnFoot, ...] | None:
 
     def checked(name: str, entry: DrawnFoot) -> DrawnFoot:
         """Return the entry with its foot in checked JSON values, ranges included."""
-        check_choice(f"{name}: on", entry.on, get_args(On))
+        require_choice(f"{name}: on", entry.on, get_args(On))
         _check_ranges(name, entry.foot)
         low, high = (foot_setting(name, _end_of(entry.foot, end)).plain for end in (0, 1))
         return replace(entry, foot=_join_ends(low, high))

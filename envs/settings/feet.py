@@ -65,7 +65,7 @@ ENGAGES = "engages"
 damping: a stop, or an exoskeleton such as that of Nuckols & Sawicki 2020 (J. Neuroeng. Rehabil. 17:75). Without it they
 act both ways, with damping."""
 SEGMENT_RATIOS = {
-    f"{part}_ratio": Number(1.0, 0.1, 3.0, "(of the intact one)")
+    f"{part}_ratio": Number(1.0, 0.1, 6.0, "(of the intact one)")
     for part in ("shank_mass", "shank_com", "shank_inertia", "foot_mass", "foot_inertia")
 }
 """Shank and foot of a prosthesis over intact ones: masses, distance of the shank's CoM from the knee, inertias about

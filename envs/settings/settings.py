@@ -11,8 +11,16 @@ from math import ceil
 from pathlib import Path
 from typing import Any, Literal, get_args
 
-from springfoot.errors import SpringfootError, quoted, require_number, require_within
-from springfoot.gait.body.body import BMI_RANGE, HEIGHT_RANGE, MASS_RANGE, REFERENCE_HEIGHT, REFERENCE_MASS, Body
+from springfoot.errors import SpringfootError, quoted, require_choice, require_number, require_within
+from springfoot.gait.body.body import (
+    BMI_RANGE,
+    HEIGHT_RANGE,
+    MASS_RANGE,
+    REFERENCE_HEIGHT,
+    REFERENCE_MASS,
+    Body,
+    CarriedAt,
+)
 from springfoot.gait.people.human import PEOPLE_FILE, HumanGait, human_gait
 from springfoot.gait.people.own_data import OwnGait
 from springfoot.gait.plan.plan import PLAN_SPEED_RANGE, Cadence
@@ -23,7 +31,6 @@ from ..physics.foot import Feet
 from ..physics.timing import ACTION_STEP
 from .checks import (
     check_bounds,
-    check_choice,
     check_guide,
     check_people_file,
     check_range,
@@ -122,7 +129,9 @@ class BipedSettings:
     foot_ratio: float = field(default=1.0, metadata=_BODY)
     """Length of the foot over the average at that height [-]."""
     carried_ratio: float = field(default=0.0, metadata=_BODY)
-    """Mass of a load on the back over body mass [-]."""
+    """Mass of a load over body mass [-]."""
+    carried_at: CarriedAt = field(default="back", metadata=_BODY)
+    """Place of the load: on the back, or around the waist."""
     left_foot: FootSetting = field(default=INTACT_FOOT, metadata=_FEET)
     """The left foot, a kind of `springfoot.envs.settings.feet` (intact, rigid, rigid_toe, no_toe, passive, adaptive,
     weak, drop), a dictionary of a `kind` and its numbers, `{"kind": "passive", "ankle_stiffness": 600}`, or, on the
@@ -249,7 +258,7 @@ class BipedSettings:
             *(("action_mode", ActionMode), ("decisions", Decisions), ("stiffness_joints", StiffnessJoints)),
             *(("acts", Acts), ("stiffness_by", StiffnessBy)),
         ):
-            check_choice(name, getattr(self, name), get_args(choices))
+            require_choice(name, getattr(self, name), get_args(choices))
         for name in FOOT_SETTINGS:
             object.__setattr__(self, name, foot_setting(name, getattr(self, name)))
         object.__setattr__(self, "drawn_feet", drawn_feet_setting(self.drawn_feet))
@@ -388,7 +397,7 @@ def settings_to_json(settings: BipedSettings) -> dict[str, Any]:
 
 def body_of(settings: BipedSettings) -> Body:
     """Return the settings' body; raise `SpringfootError` for an impossible one."""
-    return Body(settings.height, settings.mass, settings.leg_ratio, settings.foot_ratio, settings.carried_ratio)
+    return Body(**{item.name: getattr(settings, item.name) for item in fields(Body)})
 
 
 def with_bodies_of_model(settings: BipedSettings) -> BipedSettings:

@@ -7,11 +7,12 @@ lengths). All ratios of masses are of body mass, all ratios of lengths of height
 
 from dataclasses import dataclass
 from math import atan2, cos, hypot, sin, sqrt
+from typing import Literal, get_args
 
 import numpy as np
 
 from springfoot.arrays import NDArray
-from springfoot.errors import require_within
+from springfoot.errors import require_choice, require_within
 
 ANGLES = ("thigh", "knee", "ankle", "toe")
 """Curves that give the posture of a leg, from the hip down. Thigh is to the vertical: hip = thigh + trunk pitch."""
@@ -41,8 +42,13 @@ CARRIED_RATIO_RANGE = (0.0, 0.4)
 CARRIED_BEHIND = 0.2
 """Distance of a load's centre behind the trunk's CoM, at the same height [m at 1.70 m]; chosen: half the depth of the
 chest and half of a backpack 0.15 m thick."""
-CARRIED_GYRATION = 0.15
-"""Radius of gyration of a load [m at 1.70 m]; chosen, as of a uniform box 0.5 m high and 0.15 m thick."""
+CARRIED_GYRATION = {"back": 0.15, "waist": 0.11}
+"""Radius of gyration of a load [m at 1.70 m]; chosen: of a uniform box 0.5 m high and 0.15 m thick on the back, and of
+a ring 0.16 m in radius around the waist."""
+WAIST_ABOVE_HIP = 0.1
+"""Height of a belt around the waist above the hip joints [m at 1.70 m]; chosen: about that of the iliac crests."""
+CarriedAt = Literal["back", "waist"]
+"""Places of a load on the trunk."""
 
 
 def gravity(slope: float) -> NDArray:
@@ -68,7 +74,10 @@ class Body:
     foot_ratio: float = 1.0
     """Length of the foot over the average at that height."""
     carried_ratio: float = 0.0
-    """Mass of a load over body mass: a backpack, fixed to the trunk behind its CoM."""
+    """Mass of a load over body mass, fixed to the trunk."""
+    carried_at: CarriedAt = "back"
+    """Place of the load: a backpack behind the trunk's CoM, or a belt around the waist, which leaves the trunk
+    upright."""
 
     def __post_init__(self) -> None:
         require_within("height", self.height, HEIGHT_RANGE, "m")
@@ -77,6 +86,7 @@ class Body:
         require_within("leg_ratio", self.leg_ratio, LEG_RATIO_RANGE, "(relative)")
         require_within("foot_ratio", self.foot_ratio, FOOT_RATIO_RANGE, "(relative)")
         require_within("carried_ratio", self.carried_ratio, CARRIED_RATIO_RANGE, "(relative)")
+        require_choice("carried_at", self.carried_at, get_args(CarriedAt))
 
     # Scales against the reference body --------------------------------------------------------------------
 
@@ -255,12 +265,14 @@ class Body:
     @property
     def carried_com(self) -> tuple[float, float]:
         """CoM of the load (forward of the hip, above the hip) along the trunk."""
+        if self.carried_at == "waist":
+            return 0.0, WAIST_ABOVE_HIP * self.length_scale
         return -CARRIED_BEHIND * self.length_scale, self.trunk_com_above_hip
 
     @property
     def carried_inertia(self) -> float:
-        """Inertia of the load, a box with the radius of gyration `CARRIED_GYRATION`."""
-        return self.carried_mass * (CARRIED_GYRATION * self.length_scale) ** 2
+        """Inertia of the load, with the radius of gyration `CARRIED_GYRATION`."""
+        return self.carried_mass * (CARRIED_GYRATION[self.carried_at] * self.length_scale) ** 2
 
     @property
     def upper_moment(self) -> tuple[float, float]:

@@ -21,13 +21,12 @@ from springfoot.gait.body import TOE_STIFFNESS
 from ..feet.both_feet import both, braced
 from .condition_effects import Effect, Measured, change, difference, mean_of, per_unit, slope
 from .effect_numbers import FIBRE
-from .laboratory import HEAVY_FEET, LOADS, SLOPES
+from .laboratory import HEAVY_FEET, LOADS, SLOPES, WAIST_LOADS
 
 _SOUND = "sound"
 LOCKED_TOE = 1000.0
 """Stiffness of a passive foot's toe that is called locked, the largest [N m/rad]."""
 _BODY = body_of(BipedSettings())
-_FEET_KG = 2.0 * (_BODY.foot_mass + _BODY.toe_mass)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,6 +96,18 @@ def _slope_conditions(*slopes_deg: float) -> dict[Any, dict[str, Any]]:
 
 
 # Experiments --------------------------------------------------------------------------------------------------
+
+
+def _carried_mass_experiment(conditions: Mapping[float, Mapping[str, Any]]) -> Experiment:
+    """Return an experiment on masses [kg] that are carried, the keys of `conditions`: the slope of fibre work over
+    them [% of that without/kg]."""
+    return Experiment(
+        conditions=conditions,
+        speed=1.25,
+        effect=lambda measured: slope(
+            list(conditions), [100.0 * measured[kg][FIBRE] / measured[0.0][FIBRE] for kg in conditions]
+        ),
+    )
 
 
 def _weak_calf_experiment(effect_of: Callable[[float], Effect], **fields: Any) -> Experiment:
@@ -235,16 +246,8 @@ EXPERIMENTS: dict[str, Experiment | str] = {
         effect=per_unit("com_positive_W_kg", _LOADS_KG, factor=_BODY.mass),
         note="derived from mean curves of ground force and CoM velocity, both legs, all of the stride",
     ),
-    "foot_mass": Experiment(
-        conditions=HEAVY_FEET,
-        speed=1.25,
-        effect=lambda measured: slope(
-            [(ratio - 1.0) * _FEET_KG for ratio in (1.0, 2.0, 3.0)],
-            [100.0 * measured[ratio][FIBRE] / measured[1.0][FIBRE] for ratio in (1.0, 2.0, 3.0)],
-        ),
-        note=f"not as written: {_FEET_KG:.1f} and {2 * _FEET_KG:.1f} kg, as ratios end at 3",
-    ),
-    "waist_mass": "not run: no setting puts a load at the waist",
+    "foot_mass": _carried_mass_experiment(HEAVY_FEET),
+    "waist_mass": _carried_mass_experiment(WAIST_LOADS),
     "ankle_k_falls": "not run: it has neither sign nor size; springfoot study identify shows it",
     "pushoff_collision": _lost_ankle_work_experiment(lambda walk: walk["collision_J_kg"]),
     "pushoff_joint_work": _lost_ankle_work_experiment(

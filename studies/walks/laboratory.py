@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from springfoot.files.markdown import table, text_of
+from springfoot.gait.body import Body
 
 from ..base.columns import Column, falls_text, walks_csv
 from ..feet.both_feet import both
@@ -14,16 +15,22 @@ SLOPES = {"level": {}, "up": {"slope_deg": GRADE_DEG}, "down": {"slope_deg": -GR
 """Condition -> settings on slopes."""
 LOADS = {ratio: {"carried_ratio": ratio} for ratio in (0.0, 0.2, 0.4)}
 """Load on the back over body mass [-] -> settings (Huang & Kuo 2014)."""
-HEAVY_FEET = {1.0: {}} | {
-    ratio: both({"kind": "intact", "foot_mass_ratio": ratio, "foot_inertia_ratio": ratio}) for ratio in (2.0, 3.0)
+_BODY = Body()
+WAIST_LOADS = {kg: {"carried_ratio": kg / _BODY.mass, "carried_at": "waist"} for kg in (0.0, 4.0, 8.0, 16.0)}
+"""Load around the waist of a body of 63 kg [kg] -> settings (Browning et al. 2007)."""
+_FEET_KG = 2.0 * (_BODY.foot_mass + _BODY.toe_mass)
+_RATIOS = {kg: 1.0 + kg / _FEET_KG for kg in (4.0, 8.0)}
+HEAVY_FEET = {0.0: {}} | {
+    kg: both({"kind": "intact", "foot_mass_ratio": ratio, "foot_inertia_ratio": ratio}) for kg, ratio in _RATIOS.items()
 }
-"""Mass of both feet over the usual [-] -> settings (Browning et al. 2007: up to 8 kg, × 5.4; ratios end at 3)."""
+"""Mass added to both feet together of a body of 63 kg [kg] -> settings (Browning et al. 2007)."""
 LABORATORY: dict[str, Mapping[str, Any]] = {
     "usual": {},
     "8 % up": SLOPES["up"],
     "8 % down": SLOPES["down"],
     **{f"load of {100 * ratio:g} % on the back": given for ratio, given in LOADS.items() if ratio},
-    **{f"feet of {ratio:g} times the mass": given for ratio, given in HEAVY_FEET.items() if given},
+    **{f"load of {kg:g} kg at the waist": given for kg, given in WAIST_LOADS.items() if kg},
+    **{f"{kg:g} kg on the feet": given for kg, given in HEAVY_FEET.items() if kg},
 }
 """Condition in words -> settings; the others are compared with the first."""
 LABORATORY_COLUMNS = (

@@ -11,7 +11,11 @@ from springfoot.envs.physics.timing import PHYSICS_STEP, PHYSICS_STEPS_PER_WINDO
 from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.gait import GRAVITY, Body
 
-BODIES = (Body(), Body(height=1.9, mass=100.0, carried_ratio=0.2), Body(height=1.5, mass=45.0, leg_ratio=1.04))
+BODIES = (
+    Body(),
+    Body(height=1.9, mass=100.0, carried_ratio=0.2),
+    Body(1.5, 45.0, 1.04, carried_ratio=0.1, carried_at="waist"),
+)
 
 
 def steps_at_rest(num, velocity=0.0):

@@ -19,7 +19,7 @@ from springfoot.envs.physics.timing import PHYSICS_STEP
 from springfoot.envs.settings.settings import BipedSettings
 from springfoot.gait.body.body import GRAVITY, Body
 
-BODIES = [Body(), Body(1.5, 45.0), Body(1.9, 100.0), Body(1.6, 70.0, 0.94, 1.07, 0.3)]
+BODIES = [Body(), Body(1.5, 45.0), Body(1.9, 100.0, 1.0, 1.0, 0.2, "waist"), Body(1.6, 70.0, 0.94, 1.07, 0.3)]
 
 
 @pytest.mark.parametrize("body", BODIES)

@@ -32,6 +32,18 @@ def test_lengths_scale_with_height_and_inertias_with_mass_times_height_squared()
         assert getattr(large, name) / getattr(small, name) == pytest.approx(1.5 * 1.2**2)
 
 
+def test_a_load_leans_the_trunk_on_the_back_and_leaves_it_upright_around_the_waist():
+    back = Body(1.8, 75.0, carried_ratio=0.25)
+    waist = Body(1.8, 75.0, carried_ratio=0.25, carried_at="waist")
+    assert waist.trunk_lean == 0.0 < back.trunk_lean
+    assert waist.total_mass == back.total_mass and waist.carried_inertia < back.carried_inertia
+    assert waist.carried_com == pytest.approx((0.0, 0.1 * 1.8 / 1.7))
+    ring = 0.5 * waist.carried_mass * (0.16 * 1.8 / 1.7) ** 2  # about a diameter
+    assert waist.carried_inertia == pytest.approx(ring, rel=0.06)
+    with pytest.raises(SpringfootError, match=r"^carried_at must be one of 'back', 'waist', got 'head'$"):
+        Body(carried_at="head")  # pyright: ignore[reportArgumentType]
+
+
 def test_equal_froude_speed_means_speed_scales_with_root_of_length():
     assert Body(1.9).froude_speed(1.2 * math.sqrt(1.9 / 1.7)) == pytest.approx(Body().froude_speed(1.2))
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from springfoot.cli.main import study_main
-from springfoot.envs.settings import settings_from
+from springfoot.envs.settings import body_of, settings_from
 from springfoot.errors import SpringfootError
 from springfoot.evaluation.numbers import measure
 from springfoot.evaluation.recording import policy_and_settings, record
@@ -51,8 +51,8 @@ def test_every_published_effect_is_walked_or_has_a_reason():
     reasons = [one for one in EXPERIMENTS.values() if isinstance(one, str)]
     assert all(reason.startswith("not run: ") and len(reason) > 20 for reason in reasons)
     assert len(WALKED) + len(reasons) == 36
-    row = row_of("waist_mass", {})
-    assert (row["run"], row["measured"], row["note"]) == (0, None, "not run: no setting puts a load at the waist")
+    row = row_of("afo_stop_knee", {})
+    assert (row["run"], row["measured"]) == (0, None) and row["note"] in reasons
 
 
 @pytest.mark.parametrize("name", WALKED)
@@ -115,6 +115,20 @@ def test_slopes_are_of_least_squares_for_each_episode():
         [2.0, 2.0]
     )
     assert slope([[0.0, 0.0], [1.0, 2.0]], [[0.0, 0.0], [3.0, 3.0]]) == pytest.approx([3.0, 1.5])
+
+
+@pytest.mark.parametrize(("name", "masses"), [("foot_mass", (0.0, 4.0, 8.0)), ("waist_mass", (0.0, 4.0, 8.0, 16.0))])
+def test_masses_that_are_carried_cost_a_share_of_the_walk_without_them_for_each_kg(name, masses):
+    assert tuple(WALKED[name].conditions) == masses
+    carried = [settings_from(**given) for given in WALKED[name].conditions.values()]
+    bodies = [body_of(settings) for settings in carried]
+    added = [
+        body.carried_mass + sum((foot.foot_mass_ratio - 1.0) * (body.foot_mass + body.toe_mass) for foot in of.feet)
+        for body, of in zip(bodies, carried, strict=True)
+    ]
+    assert added == pytest.approx(masses)
+    walks = planted(name, lambda kg, *_: {"walked_m_s": 1.25, FIBRE: 3.0 * (1.0 + 0.05 * kg)})
+    assert row_of(name, {"one": walks})["measured"] == pytest.approx(5.0)
 
 
 def test_an_effect_of_ankle_work_lost_is_per_joule_lost():
