@@ -135,8 +135,9 @@ def spoken_verdict(
 ) -> dict[str, str]:
     """Return the verdict in words: heading -> sentences on falls, walker, faults, speed, joints, forces and energy.
 
-    At the speed for which the criteria were chosen they judge the walk. At other speeds, or with the user's own
-    recording (the setting `human`), the walk is compared with people's curves or with that recording, without criteria.
+    At the speed for which the criteria were chosen they judge the walk. At other speeds, with the user's own recording
+    (the setting `human`), or if every episode falls, the walk is compared with people's curves or with that recording,
+    without criteria.
 
     Args:
         metrics: content of metrics.json.
@@ -146,10 +147,10 @@ def spoken_verdict(
     environment = metrics["environment"]
     settings = settings_from(**environment)
     people = people_metrics(settings)
-    # The criteria hold for people at one speed.
-    judged = environment["human"] is None and environment["speed"] == JUDGED_SPEED
     falls = metrics["falls"]
     episodes = metrics["episodes"]
+    # The criteria hold for people at one speed, and for a walk.
+    judged = environment["human"] is None and environment["speed"] == JUDGED_SPEED and falls < episodes
     reasons = ", ".join(f"{count} × {reason}" for reason, count in metrics["fall_reasons"].items())
     episode_count = f"{episodes} episode{'' if episodes == 1 else 's'}"
     falls_text = f"Fell in {falls} of {episode_count}: {reasons}." if falls else f"Never fell in {episode_count}."
@@ -160,6 +161,10 @@ def spoken_verdict(
         "Falls": f"{falls_text} Mean length {metrics['seconds_mean']:.1f} s.",
         "Walker": f"{walker_words(settings, words_of)}, {environment['speed']:g} m/s, {_guide_words(settings)}.",
     }
+    if falls == episodes:
+        verdict["Walk"] = "None: every episode ends in a fall. All numbers are of the time before."
+    elif falls:
+        verdict["Walk"] = f"{falls} of {episode_count} end in a fall. All numbers count the time before too."
     if metrics["strides"]["count"] == 0:
         return verdict | {"Gait": "No complete stride after the warm-up, so nothing of the gait could be measured."}
     whose = "people" if environment["human"] is None else "the own person"

@@ -230,8 +230,24 @@ def test_a_walk_that_only_falls_has_a_page_too(tmp_path):
     reader = Reader((tmp_path / "report.html").read_text(encoding="utf-8"))
     said = " ".join(reader.said)
     assert "Fell in 2 of 2 episodes" in said and "nothing of the gait could be measured" in said
+    assert "None: every episode ends in a fall." in said
     own = reader.data["policies"][0]
     assert own["panels"][0]["mean"] == [None] * 101 and len(own["figure"]["base"]) > 50
+
+
+@pytest.mark.parametrize(
+    ("falls", "words"),
+    [
+        (0, ""),
+        (1, "1 of 2 episodes end in a fall. All numbers count the time before too."),
+        (2, "None: every episode ends in a fall. All numbers are of the time before."),
+    ],
+)
+def test_the_verdict_on_a_walk_that_falls_says_so_and_meets_no_criteria(walk, falls, words):
+    fallen = walk[1].metrics | {"falls": falls, "fall_reasons": {"hips below 0.55 m": falls}}
+    said = spoken_verdict(fallen, leg_numbers(walk[1].tally))
+    assert said.get("Walk", "") == words
+    assert ("criteria" in said["Joints"] + said["Forces"] + said["Energy"]) == (falls < 2)
 
 
 def test_a_name_is_text_and_nothing_else(tmp_path):
