@@ -87,7 +87,7 @@ def foot_given(value: str | dict[str, Any]) -> str | dict[str, Any]:
 
 
 def read_foot_flag(words: str) -> str | dict[str, Any]:
-    """Return the foot setting of a flag's value: a kind's word, JSON text, or a file's name.
+    """Return the foot setting of a value of `--foot`: a kind's word, JSON text, or a file's name.
 
     Raises `SpringfootError` for text that is no JSON, and for a file that cannot be read.
     """
@@ -96,7 +96,7 @@ def read_foot_flag(words: str) -> str | dict[str, Any]:
     except SpringfootError:
         raise  # it is a ValueError too
     except ValueError as error:
-        raise SpringfootError(f"a foot {error}") from None
+        raise SpringfootError(f"--foot {error}") from None
 
 
 LIST_FLAGS = ("drawn_feet", "drawn_bodies")

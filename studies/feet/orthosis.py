@@ -13,6 +13,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from springfoot.envs.settings import KINDS, SPRING_NUMBERS
 from springfoot.errors import require_within
 
 from .spring_map import SpringMap
@@ -46,7 +47,15 @@ class Orthosis(SpringMap):
 
 def braced_calf(strength: float, spring: float, rest_deg: float = 0.0) -> dict[str, Any]:
     """Return the setting of a foot in an orthosis of stiffness `spring` [N m/deg] and rest angle `rest_deg`, below a
-    calf of `strength` times a sound calf's; raise `SpringfootError` for a spring out of range."""
+    calf of `strength` times a sound calf's; raise `SpringfootError`, which names flags of `springfoot feet`, for a
+    number out of range."""
     require_within("spring", spring, (0.0, MOST_SPRING), "N m/deg")
-    calf = {"kind": "intact"} if strength == 1.0 else {"kind": "weak", "strength": strength}
+    rest = SPRING_NUMBERS["ankle_deg"]
+    require_within("rest_deg", rest_deg, (rest.low, rest.high), rest.unit)
+    if strength == 1.0:
+        calf = {"kind": "intact"}
+    else:
+        weak = KINDS["weak"]["strength"]
+        require_within("calf", strength, (weak.low, weak.high), weak.unit)
+        calf = {"kind": "weak", "strength": strength}
     return calf | {"orthosis": {"ankle_stiffness": round(spring * PER_DEG, 3), "ankle_deg": rest_deg}}
