@@ -24,7 +24,9 @@ at 0.85 to 1.9 m/s, and walks here on sound, weak, passive, rigid and dropping f
 LONGEST_SKIP = 1e4
 """Longest start of a walk that may be left out [s]; chosen."""
 LONG_WALK = 10.0
-"""Time from which a walk may begin as simulations do, from a state that is not yet its gait [s]; chosen."""
+"""Time from which the first `WARM_UP` of a walk does not count [s]; chosen. A simulation begins in a state that is not
+yet its gait, and of a laboratory's treadmill these are 3 of ten strides or more, whose belt may still speed up; walks
+over ground, which begin before the cameras see them, are shorter."""
 
 COARSE = (
     "interpolated by cubic splines; in short phases of stance, such as controlled plantarflexion, quasi-stiffness may "
@@ -62,14 +64,14 @@ def read_person(
     side: str = "both",
     mass: float | None = None,
     speed: float | None = None,
-    skip: float | None = 0.0,
+    skip: float | None = None,
     trust_units: bool = False,
     columns: Mapping[str, str] = NO_NAMES,
 ) -> MeasuredPerson:
     """Return one person's walk from its files.
 
     `speed` [m/s] goes before that of the files. Of a walk over time the first `skip` seconds are left out; None leaves
-    out `WARM_UP` of a walk that lasts `LONG_WALK`. The rest is as of `read_gait`.
+    out `WARM_UP` of a walk that lasts `LONG_WALK`. The rest is as of `read_gait`, which leaves out nothing.
 
     A leg with too few strides for a spread is kept, with all its strides. Raises `SpringfootError` as `read_gait` does,
     for forces that bear a mass outside `MASS_RANGE`, for a toe's moment larger than the ankle's, and for a

@@ -35,6 +35,9 @@ class MotionFiles(Study):
     """Name of a column here, and its name in the files, such as knee_angle_r=KneeRight; once for each column."""
     speed: float | None = None
     """Walking speed [m/s]; None takes that of the files."""
+    skip: float | None = None
+    """Time at the start of the files that does not count [s]; None takes 3 s, as evaluations do, of walks of 10 s and
+    more."""
     trust_units: tyro.conf.FlagCreatePairsOff[bool] = False
     """Take the files as they are, even if units or signs look wrong."""
 
@@ -54,9 +57,8 @@ class MotionFiles(Study):
             raise SpringfootError("--columns names one of our columns twice")
         Body(height=self.height)
 
-    def read(self, skip: float | None = 0.0) -> MeasuredPerson:
-        """Return the person measured in the files, without the first `skip` seconds of the walk; None leaves out 3 s of
-        a long walk (`read_person`)."""
+    def read(self) -> MeasuredPerson:
+        """Return the person measured in the files."""
         named = [files_of(words) for words in self.files]
         conditions = [condition for _, condition in named if condition is not None]
         if conditions and len(named) > 1:
@@ -69,7 +71,7 @@ class MotionFiles(Study):
             side=self.side,
             mass=self.mass,
             speed=self.speed,
-            skip=skip,
+            skip=self.skip,
             trust_units=self.trust_units,
             columns=dict(words.split("=", 1) for words in self.columns),
         )

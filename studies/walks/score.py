@@ -77,13 +77,9 @@ class Score(MotionFiles):
     Angles, forces and moments as `springfoot evaluate` counts them, beside published simulations.
     """
 
-    skip: float | None = None
-    """Time at the start of the files that does not count [s]; None takes 3 s, as evaluations do, of walks of 10 s and
-    more."""
-
     def ask(self, progress: OnProgress) -> Answer:
         """Read the files; score the gait against people, and set it beside published simulations."""
-        measured = self.read(self.skip)
+        measured = self.read()
         human = human_gait(measured.gait.speed or USUAL_SPEED, self.height)
         curves = curves_by_side(measured)
         numbers = {side: gait_numbers(of_side, human) for side, of_side in curves.items()}

@@ -140,8 +140,9 @@ def test_a_start_longer_than_the_walk_is_refused(tmp_path, capsys):
         ("9", "walk.csv lasts 3.99 s, and 9 s are left out"),
         ("-1", "skip must be in [0, 10000] s, got -1"),
     ):
-        assert main(["score", str(tmp_path / "walk.csv"), "--skip", words]) == 2
-        assert error in capsys.readouterr().err
+        for command in ("score", "person"):
+            assert main([command, str(tmp_path / "walk.csv"), "--skip", words]) == 2
+            assert error in capsys.readouterr().err
 
 
 def test_every_published_walk_has_a_number_a_source_and_words_on_its_licence():
