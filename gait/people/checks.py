@@ -5,7 +5,7 @@ shifts it by half a stride, time that runs backward reverses it, noise roughens 
 that walks here on any of its feet, slopes and speeds, differ from people by less than that.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -76,6 +76,14 @@ MISTAKEN_UNITS = {
     "grf": {"percent of body weight": 100.0, "N": GRAVITY * REFERENCE_MASS, "N/kg": GRAVITY, "kN": 1e-3},
 }
 """Mistaken unit -> the factor by which it makes a curve larger."""
+MISTAKEN_BEFORE_MASS = {
+    "moment": {"N m/kg where N m must be": 1 / REFERENCE_MASS, "N mm where N m must be": 1e3, "kN m": 1e-3},
+    "power": {"W/kg where W must be": 1 / REFERENCE_MASS, "mW": 1e3},
+    "grf": {"body weights where N must be": 1 / (GRAVITY * REFERENCE_MASS), "kN where N must be": 1e-3},
+}
+"""As `MISTAKEN_UNITS`, of curves that are divided by mass or weight after reading."""
+UNITS_TOLD = {"angle": "deg", "moment": "N m/kg", "power": "W/kg", "grf": "body weights"}
+"""Unit in which a curve is told that has a column of another name than in `COLUMNS`."""
 NEAR_UNIT = 2.5
 """Largest factor between a curve and people's curve in a mistaken unit for that unit to be the guess; chosen."""
 LARGEST_KNEE = np.radians(100)
@@ -111,7 +119,13 @@ AS_IT_IS = "if it is right, trust_units takes it as it is"
 
 
 def require_plausible(
-    name: str, mean: Curves, people: HumanGait, sd: Curves | None = None, mass_given: bool = False
+    name: str,
+    mean: Curves,
+    people: HumanGait,
+    sd: Curves | None = None,
+    mass_given: bool = False,
+    columns: Mapping[str, str] = COLUMNS,
+    divided: Collection[str] = (),
 ) -> None:
     """Raise `SpringfootError` for mean curves (101,) that no walk has, with the likeliest cause, such as a wrong unit.
 
@@ -121,9 +135,11 @@ def require_plausible(
         people: gait to compare the curves with.
         sd: spreads (101,) of some of the curves.
         mass_given: True if moments in N m were divided by a mass that the user gave.
+        columns: curve -> its column in the file.
+        divided: curves that were divided by mass or weight after reading.
     """
     usual = {curve: people.mean(curve, PERCENT / 100) for curve in COLUMNS}
-    if doubt := next(_doubts(mean, usual, mass_given), None):
+    if doubt := next(_doubts(mean, usual, mass_given, columns, divided), None):
         raise SpringfootError(f"{name}: {doubt}; {AS_IT_IS}")
     for curve, spread in (sd or {}).items():
         if not 0 <= spread.min() <= spread.max() <= MOST_SPREAD * max(np.ptp(usual[curve]), np.ptp(mean[curve])):
@@ -151,7 +167,9 @@ def require_plausible_legs(walk: MeasuredWalk, side: str, mass: float | None, pe
         except SpringfootError:  # too few strides
             continue
         mean = {curve: values.mean(axis=0) for curve, values in curves.items()}
-        require_plausible(name, mean, people, mass_given=is_mass_given(walk, mass))
+        columns = COLUMNS | {curve: column for (side_of, curve), column in walk.columns.items() if side_of == leg}
+        divided = {curve for side_of, curve in walk.unscaled if side_of == leg}
+        require_plausible(name, mean, people, mass_given=is_mass_given(walk, mass), columns=columns, divided=divided)
 
 
 def is_mass_given(walk: MeasuredWalk, mass: float | None) -> bool:
@@ -169,16 +187,21 @@ def _bears_downward(force: NDArray) -> bool:
     return bool(-least > force.max(initial=0.0) and 0.25 < np.mean(force < 0.5 * least) < 0.9)
 
 
-def _doubts(mean: Curves, usual: Curves, mass_given: bool) -> Iterator[str]:
-    """Yield texts that say why mean curves (101,) cannot be right, the surest first; `usual` are people's curves."""
+def _doubts(
+    mean: Curves, usual: Curves, mass_given: bool, columns: Mapping[str, str], divided: Collection[str]
+) -> Iterator[str]:
+    """Yield texts that say why mean curves (101,) cannot be right, the surest first.
+
+    `usual` are people's curves, the rest is as of `require_plausible`.
+    """
     if "knee" in mean and mean["knee"].mean() > LARGEST_KNEE:
         yield (
             f"the knee is at {np.degrees(mean['knee']).mean():.0f} deg on the average: the angle between thigh and "
             "shank? flexion is 180 deg less that"
         )
     sizes = {curve: float(np.ptp(mean[curve]) / np.ptp(usual[curve])) for curve in mean}
-    yield from _doubts_of_noise(mean, usual)
-    yield from _doubts_of_size(mean, sizes, mass_given)
+    yield from _doubts_of_noise(mean, usual, columns)
+    yield from _doubts_of_size(mean, sizes, mass_given, columns, divided)
     large_enough = [curve for curve in mean if sizes[curve] >= CURVE_LIMITS[curve].least]
     # Entry k is the correlation after a shift of k % of the stride: entry 0 is that of the curve as it is.
     likeness = {curve: _likeness(mean[curve], usual[curve]) for curve in large_enough}
@@ -194,28 +217,32 @@ def _doubts(mean: Curves, usual: Curves, mass_given: bool) -> Iterator[str]:
         or (curve in SHAPED and likeness[curve][HALF_A_STRIDE].max() - likeness[curve][0] > HALF_GAIN)
     ]
     # A curve unlike people's gets a guess of the cause. Those of the wrong sign are surer than the next two checks.
-    guesses = {curve: _guess(curve, mean[curve], usual, likeness[curve], backward[curve][0]) for curve in unlike}
+    guesses = {
+        curve: _guess(curve, mean[curve], usual, likeness[curve], backward[curve][0], columns) for curve in unlike
+    }
     for curve in unlike:
         if guesses[curve] == _OPPOSITE:
-            yield f"{COLUMNS[curve]} is opposite to people's (r = {likeness[curve][0]:.2f}): {_needed_sign(curve)}"
-    yield from _doubts_of_zero(mean, usual)
-    yield from _doubts_of_forces(mean)
+            yield f"{columns[curve]} is opposite to people's (r = {likeness[curve][0]:.2f}): {_needed_sign(curve)}"
+    yield from _doubts_of_zero(mean, usual, columns)
+    yield from _doubts_of_forces(mean, columns)
     for curve, guess in guesses.items():
-        yield f"{COLUMNS[curve]} is not like people's (r = {likeness[curve][0]:.2f}){guess}?"
+        yield f"{columns[curve]} is not like people's (r = {likeness[curve][0]:.2f}){guess}?"
 
 
-def _doubts_of_noise(mean: Curves, usual: Curves) -> Iterator[str]:
-    """Yield a text for each mean curve (101,) with more noise than `ROUGHNESS`; `usual` are people's curves."""
+def _doubts_of_noise(mean: Curves, usual: Curves, columns: Mapping[str, str]) -> Iterator[str]:
+    """Yield a text for each mean curve (101,) with more noise than `ROUGHNESS`; arguments as of `_doubts`."""
     for curve, values in mean.items():
         jump = float(np.median(np.abs(np.diff(values, 2))))
         if jump > ROUGHNESS[_kind(curve)] * max(np.ptp(values), np.ptp(usual[curve])):
-            yield f"{COLUMNS[curve]} jumps up and down from percent to percent: noise? filter it, or take more strides"
+            yield f"{columns[curve]} jumps up and down from percent to percent: noise? filter it, or take more strides"
 
 
-def _doubts_of_size(mean: Curves, sizes: Mapping[str, float], mass_given: bool) -> Iterator[str]:
+def _doubts_of_size(
+    mean: Curves, sizes: Mapping[str, float], mass_given: bool, columns: Mapping[str, str], divided: Collection[str]
+) -> Iterator[str]:
     """Yield a text for each curve that is too large or too small, with the mistaken unit if there is one.
 
-    `sizes` are excursions over people's.
+    `sizes` are excursions over people's, the rest is as of `_doubts`.
     """
     for curve, size in sizes.items():
         kind = _kind(curve)
@@ -225,12 +252,13 @@ def _doubts_of_size(mean: Curves, sizes: Mapping[str, float], mass_given: bool) 
         if size > high or (size < low and not _may_be_small(curve, sizes)):
             if size == 0:
                 value = mean[curve][0] + 0.0  # no -0
-                yield f"{COLUMNS[curve]} is {value:.3g} throughout the stride: was it measured?"
+                yield f"{columns[curve]} is {value:.3g} throughout the stride: was it measured?"
                 continue
             least, most = _range_as_written(curve, mean[curve])
+            unit = "" if columns[curve] == COLUMNS[curve] else f" {UNITS_TOLD[kind]}"
             yield (
-                f"{COLUMNS[curve]} goes from {least:.3g} to {most:.3g}, {size:.2g} times as far as people's: "
-                f"{_mistaken_unit(kind, size)}?"
+                f"{columns[curve]} goes from {least:.3g} to {most:.3g}{unit}, {size:.2g} times as far as people's: "
+                f"{_mistaken_unit(kind, size, curve in divided)}?"
             )
 
 
@@ -244,21 +272,23 @@ def _may_be_small(curve: str, sizes: Mapping[str, float]) -> bool:
     return (rigid or curve in SMALL_MEANS_NOTHING) and any(others)
 
 
-def _mistaken_unit(kind: str, size: float) -> str:
-    """Return the mistaken unit that makes a curve about `size` times as large as people's, or a vaguer cause."""
-    factors = MISTAKEN_UNITS[kind]
+def _mistaken_unit(kind: str, size: float, divided: bool) -> str:
+    """Return the mistaken unit that makes a curve about `size` times as large as people's, or a vaguer cause; `divided`
+    is True for a curve divided by mass or weight after reading."""
+    factors = MISTAKEN_BEFORE_MASS[kind] if divided else MISTAKEN_UNITS[kind]
     nearest = min(factors, key=lambda unit: abs(np.log(size / factors[unit])))
     near = abs(np.log(size / factors[nearest])) < np.log(NEAR_UNIT)
     return nearest if near else "another scale, or another joint's"
 
 
-def _doubts_of_zero(mean: Curves, usual: Curves) -> Iterator[str]:
-    """Yield a text for each angle whose mean is far from people's, as if counted from another zero."""
+def _doubts_of_zero(mean: Curves, usual: Curves, columns: Mapping[str, str]) -> Iterator[str]:
+    """Yield a text for each angle whose mean is far from people's, as if counted from another zero; arguments as of
+    `_doubts`."""
     for curve in (name for name in mean if name in ANGLE_CURVES):
         offset = float(mean[curve].mean() - usual[curve].mean())
         if abs(offset) > LARGEST_OFFSET:
             yield (
-                f"{COLUMNS[curve]} is {np.degrees(mean[curve].mean()):.0f} deg on the average, "
+                f"{columns[curve]} is {np.degrees(mean[curve].mean()):.0f} deg on the average, "
                 f"{np.degrees(abs(offset)):.0f} deg {'more' if offset > 0 else 'less'} than people's: from another "
                 f"zero? 0 is {_ZEROS.get(curve, 'a straight leg')}"
             )
@@ -306,10 +336,13 @@ def _doubts_of_time(likeness: Curves, backward: Curves) -> Iterator[str]:
 _OPPOSITE = ": opposite"
 
 
-def _guess(curve: str, values: NDArray, usual: Curves, likeness: NDArray, backward: float) -> str:
+def _guess(
+    curve: str, values: NDArray, usual: Curves, likeness: NDArray, backward: float, columns: Mapping[str, str]
+) -> str:
     """Return words for the change that makes a curve most like people's: turned, reversed, shifted, or another's name.
 
-    `likeness` (100,) is the curve's `_likeness`, `backward` the correlation of the reversed curve.
+    `likeness` (100,) is the curve's `_likeness`, `backward` the correlation of the reversed curve; `columns` as of
+    `_doubts`.
     """
     # The best shift; shifts near 0 and 100 % do not count.
     shift = LEAST_SHIFT + int(likeness[LEAST_SHIFT : 101 - LEAST_SHIFT].argmax())
@@ -321,13 +354,14 @@ def _guess(curve: str, values: NDArray, usual: Curves, likeness: NDArray, backwa
         _OPPOSITE: -likeness[0],
         ": backward in time": backward,
         f", but so {shift} % of the stride late: of the other foot": likeness[shift],
-        f", but like {COLUMNS[likest]}: were columns interchanged": likeness_of_others[likest],
+        f", but like {columns[likest]}: were columns interchanged": likeness_of_others[likest],
     }
     return max(correlations, key=lambda change: correlations[change])
 
 
-def _doubts_of_forces(mean: Curves) -> Iterator[str]:
-    """Yield a text if the vertical force does not bear half a body, or does not fit the ankle's moment."""
+def _doubts_of_forces(mean: Curves, columns: Mapping[str, str]) -> Iterator[str]:
+    """Yield a text if the vertical force does not bear half a body, or does not fit the ankle's moment; arguments as of
+    `_doubts`."""
     if "grf_vertical" not in mean:
         return
     force = mean["grf_vertical"]
@@ -336,11 +370,11 @@ def _doubts_of_forces(mean: Curves) -> Iterator[str]:
     borne = float(force[:-1].mean())  # percent 100 is percent 0 of the next stride
     if not least <= borne <= most:
         guess = "both feet together, or not per body weight?" if borne > most else "not per body weight?"
-        yield f"{COLUMNS['grf_vertical']} is {borne:.2g} on the average, where each foot bears half of 1: {guess}"
+        yield f"{columns['grf_vertical']} is {borne:.2g} on the average, where each foot bears half of 1: {guess}"
     if "ankle_moment" not in mean:
         return
     peak = int(mean["ankle_moment"].argmax())
-    column = COLUMNS["ankle_moment"]
+    column = columns["ankle_moment"]
     # [N m/kg] over [body weights] x g is the distance [m] of the force from the ankle.
     lever = float(mean["ankle_moment"][peak] / (GRAVITY * max(force[peak], LEAST_LOAD)))
     if force[peak] < LEAST_LOAD:

@@ -9,11 +9,20 @@ import numpy as np
 from springfoot.errors import SpringfootError, require_within
 from springfoot.files.text_table import Table
 
-from ..body.body import MASS_RANGE
+from ..body.body import GRAVITY, MASS_RANGE
 from .checks import AS_IT_IS
 from .gait_events import PERCENT, WARM_UP
+from .human import COLUMNS
 from .motion_files import NO_NAMES
-from .own_data import ACCEPTED, OwnGait, gait_of_percents, gait_of_walk, one_condition, percent_curves, read_files
+from .own_data import (
+    ACCEPTED,
+    OwnGait,
+    gait_of_percents,
+    gait_of_walk,
+    one_condition,
+    percent_curves,
+    read_files,
+)
 from .strides import LegStrides, MeasuredWalk, borne_mass, force_delay, strides_of_legs
 
 MASSES_APART = 1.1
@@ -21,6 +30,11 @@ MASSES_APART = 1.1
 CLOCKS_APART = 0.06
 """Largest time between forces and motion that gets no note [s]; chosen. Right files have 0.03 s at most: people
 at 0.85 to 1.9 m/s, and walks here on sound, weak, passive, rigid and dropping feet."""
+FORCE_UNIT_OFF = 0.1
+"""Largest difference of the borne weight from that of a unit, for the unit to be the guess [-]; chosen."""
+SMALLEST_NM = 6.0
+"""Peak of an ankle's moment below which it is not in N m; chosen: the least mass, 20 kg, makes 28 at people's 1.4
+N m/kg, and 3.5 times people's moment is 4.9 N m/kg."""
 LONGEST_SKIP = 1e4
 """Longest start of a walk that may be left out [s]; chosen."""
 LONG_WALK = 10.0
@@ -113,7 +127,8 @@ def read_person(
             low, high = MASS_RANGE
             if not low <= borne <= high:
                 raise SpringfootError(
-                    f"{walk.name}: the vertical forces bear {borne:.3g} kg, must be {low:g} to {high:g}: are they in N?"
+                    f"{walk.name}: the vertical forces, {_columns_of(walk, 'grf_vertical')}, bear {borne:.3g} kg, must "
+                    f"be {low:g} to {high:g}: {_force_unit(borne)}?"
                 )
         gait = gait_of_walk(walk, side, mass, trust_units)
         legs = {leg: strides for leg, strides in strides_of_legs(walk, side, mass).items() if len(strides.times)}
@@ -127,6 +142,7 @@ def read_person(
             )
         if any(name.endswith("_moment") for _, name in walk.unscaled) and mass is None and borne is None:
             notes.append("Moments left out: they are in N m, and without forces only --mass tells the body mass.")
+            notes += _doubtful_moments(walk)
     if speed is not None:
         gait = replace(gait, speed=speed)
     _require_small_toe_moment(gait.name, legs, trust_units)
@@ -136,6 +152,29 @@ def read_person(
     return MeasuredPerson(
         gait=gait, legs=legs, mass=borne if mass is None else mass, mass_from=mass_from, notes=tuple(notes)
     )
+
+
+def _columns_of(walk: MeasuredWalk, curve: str) -> str:
+    """Return the columns of a curve in words, of all legs."""
+    return " and ".join(column for (_, name), column in walk.columns.items() if name == curve) or COLUMNS[curve]
+
+
+def _force_unit(borne: float) -> str:
+    """Return the unit in which forces bear a mass `borne` [kg] out of range: both feet bear one body weight."""
+    low, high = MASS_RANGE
+    of_body = {"body weights": 1.0, "percent of body weight": 100.0, "N/kg": GRAVITY}
+    for unit, weight in of_body.items():
+        if abs(borne * GRAVITY / weight - 1.0) < FORCE_UNIT_OFF:
+            return f"in {unit}, not in N"
+    return "in kN, not in N" if low <= 1e3 * borne <= high else "are they in N"
+
+
+def _doubtful_moments(walk: MeasuredWalk) -> list[str]:
+    """Return a sentence on ankle moments too small for N m, if they are; a list of it, or an empty one."""
+    peaks = [float(np.abs(leg["ankle_moment"]).max()) for leg in walk.legs.values() if "ankle_moment" in leg]
+    if not peaks or max(peaks) >= SMALLEST_NM:
+        return []
+    return [f"The largest of {_columns_of(walk, 'ankle_moment')} is {max(peaks):.2g}, too little for N m: in N m/kg?"]
 
 
 def _require_small_toe_moment(name: str, legs: Mapping[str, LegStrides], trust_units: bool) -> None:

@@ -34,6 +34,8 @@ TIME_COLUMNS = ("time_s", "time", "Time")
 FILE_SIDES = ("left", "right")
 PARAMETERS = {"speed": "speed_m_s", "stride_time": "stride_time_s", "step_length": "step_length_m"}
 """Number beside mean curves -> its column."""
+HIGHEST_PELVIS = 3.0
+"""Largest median height of the pelvis above the laboratory's floor [m]; chosen, people's is about 1."""
 WALKING_SPEED = 0.3
 """Speed of the body in the laboratory below which it walks on a treadmill [m/s]; chosen."""
 
@@ -63,8 +65,12 @@ class Trial:
     """Side -> events in the file."""
     speed: float | None = None
     """Walking speed [m/s]; None if the file has none."""
+    speed_column: str = PARAMETERS["speed"]
+    """Column that tells the speed."""
     columns: Sequence[str] = ()
     """Names of the file's columns, if it is a text file."""
+    column_of: Mapping[tuple[str, str], str] = field(default_factory=dict)
+    """(side, curve) -> its column in the file, of curves whose column is not that of `COLUMNS`."""
     notes: tuple[str, ...] = ()
     """Sentences on guesses."""
 
@@ -163,6 +169,8 @@ def opensim_trial(path: Path, renamed: Mapping[str, str] = NO_NAMES) -> Trial:
     as_read = make_table(path.name, ((n, _split(line)) for n, line in enumerate(lines, end + 2)))
     table = as_read.renamed(renamed)
     names = table.columns
+    as_typed = {ours: theirs for theirs, ours in renamed.items()}
+    column_of: dict[tuple[str, str], str] = {}
     if "time" not in names:
         raise SpringfootError(f"{path.name}, line {end + 2}: no column time")
 
@@ -172,8 +180,10 @@ def opensim_trial(path: Path, renamed: Mapping[str, str] = NO_NAMES) -> Trial:
         for coordinate, curve in _OPENSIM.items():
             if (column := f"{coordinate}_{side[0]}") in names:
                 curves[curve] = table.numbers(column)
+                column_of[side, curve] = as_typed.get(column, column)
         if "hip" in curves and tilt is not None:
             curves["thigh"] = curves["hip"] + tilt
+            column_of[side, "thigh"] = f"{column_of[side, 'hip']} + pelvis_tilt"
     notes = ()
     if any(legs.values()) and not in_degrees:
         widest = max(float(np.ptp(values)) for curves in legs.values() for values in curves.values())
@@ -185,6 +195,7 @@ def opensim_trial(path: Path, renamed: Mapping[str, str] = NO_NAMES) -> Trial:
     if any(legs.values()) and in_degrees not in ("yes", "no"):
         raise SpringfootError(f"{path.name}: its header must say inDegrees=yes or inDegrees=no, got {in_degrees!r:.40}")
     unit = np.pi / 180 if in_degrees == "yes" else 1.0
+    _require_metres(table)
     # The pelvis's first and last position tell the speed, and whether the walk is towards the laboratory's -x.
     travelled = table.numbers("pelvis_tx")[[0, -1]] if "pelvis_tx" in names else np.zeros(2)
     time = table.ascending("time")
@@ -195,13 +206,14 @@ def opensim_trial(path: Path, renamed: Mapping[str, str] = NO_NAMES) -> Trial:
         for coordinate, curve in _OPENSIM.items():
             if (column := f"{coordinate}_{side[0]}_moment") in names:
                 curves[f"{curve}_moment"] = -table.numbers(column)
+                column_of[side, f"{curve}_moment"] = as_typed.get(column, column)
         # Files differ in the case of the forces' names.
         lower = {name.lower(): name for name in names}
         force = next((name for name in _OPENSIM_FORCE[side] if f"{name}y" in lower), None)
-        if force:
-            curves["grf_vertical"] = table.numbers(lower[f"{force}y"])
-            if f"{force}x" in lower:
-                curves["grf_forward"] = table.numbers(lower[f"{force}x"])
+        for axis, curve in (("y", "grf_vertical"), ("x", "grf_forward")):
+            if force and (column := lower.get(f"{force}{axis}")):
+                curves[curve] = table.numbers(column)
+                column_of[side, curve] = as_typed.get(column, column)
     return Trial(
         name=path.name,
         time=time,
@@ -211,9 +223,20 @@ def opensim_trial(path: Path, renamed: Mapping[str, str] = NO_NAMES) -> Trial:
         forces_along_x=True,
         backward=velocity < -WALKING_SPEED,
         speed=abs(velocity) if abs(velocity) > WALKING_SPEED else None,
+        speed_column=as_typed.get("pelvis_tx", "pelvis_tx"),
         columns=as_read.columns,
+        column_of=column_of,
         notes=notes,
     )
+
+
+def _require_metres(table: Table) -> None:
+    """Raise `SpringfootError` if the pelvis is higher than `HIGHEST_PELVIS`: its positions are in another unit."""
+    if "pelvis_ty" in table.columns:
+        height = float(np.median(table.numbers("pelvis_ty")))
+        if height > HIGHEST_PELVIS:
+            unit = "mm" if height > 100 * HIGHEST_PELVIS else "cm"
+            raise SpringfootError(f"{table.name}: pelvis_ty is {height:.3g} in the median, must be in m: {unit}?")
 
 
 def not_empty(name: str, legs: Mapping[str, Series]) -> dict[str, Series]:

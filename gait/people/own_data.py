@@ -7,13 +7,14 @@ come from the vertical force; without it, from the events in the file; without t
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from math import log, sqrt
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from springfoot.arrays import NDArray
-from springfoot.errors import SpringfootError, perhaps, require_count, require_within
+from springfoot.errors import SpringfootError, as_float, perhaps, require_count, require_within
 from springfoot.files.text_table import Table, read_csv
 
 from ..body.body import MASS_RANGE
@@ -43,6 +44,13 @@ ACCEPTED = {
     "toe_off": (0.3, 0.9, "of the stride"),
 }
 """Parameter beside the curves -> least and largest accepted value, and unit; chosen."""
+MISTAKEN_PARAMETERS = {
+    "speed": {"mm/s": 1e3, "cm/s": 1e2, "km/h": 3.6},
+    "stride_time": {"ms": 1e3},
+    "step_length": {"mm": 1e3, "cm": 1e2},
+    "toe_off": {"in percent": 1e2, "a fraction, where percent must be": 1e-2},
+}
+"""Parameter -> mistaken unit -> the factor by which it makes the parameter larger."""
 COMFORTABLE_SPEED = 1.2
 """Speed of the people to compare curves of unknown speed with [m/s]; chosen."""
 SPEEDS_APART = 1.4
@@ -305,6 +313,8 @@ def one_condition(table: Table, condition: str | None) -> Table:
 def gait_of_walk(walk: MeasuredWalk, side: str, mass: float | None, trust_units: bool) -> OwnGait:
     """Return the mean gait of a walk's strides, or raise `SpringfootError` for curves that no walk has."""
     _require_side(side)
+    if walk.speed is not None:
+        _require_accepted(f"{walk.name}: speed, of {walk.speed_column},", "speed", walk.speed)
     strides, curves = cut_strides(walk, side, mass)  # strides: heel strike, toe-off, next heel strike
     mean = {name: values.mean(axis=0) for name, values in curves.items()}
     for name in ("thigh", "hip"):
@@ -372,14 +382,28 @@ def _with_series(gait: OwnGait, mean: Series, sd: Series, trust_units: bool, mas
 def _checked_gait(gait: OwnGait) -> OwnGait:
     """Return `gait`, unchanged; raise `SpringfootError` for parameters outside `ACCEPTED`, and for forces without a
     toe-off."""
-    for name, (low, high, unit) in ACCEPTED.items():
+    for name in ACCEPTED:
         if getattr(gait, name) is not None:
-            require_within(f"{gait.name}: {name}", getattr(gait, name), (low, high), unit)
+            _require_accepted(f"{gait.name}: {name}", name, getattr(gait, name))
     if gait.strides is not None:
         require_count(f"{gait.name}: strides", gait.strides)
     if gait.toe_off is None and any(name in FORCES for name in (*gait.mean, *gait.sd)):
         raise SpringfootError(f"{gait.name}: forces need a toe_off")
     return gait
+
+
+def _require_accepted(label: str, name: str, value: object) -> None:
+    """Raise `SpringfootError` for the `value` of a parameter outside `ACCEPTED`, with the likeliest mistaken unit; it
+    begins with `label`."""
+    low, high, unit = ACCEPTED[name]
+    try:
+        require_within(label, value, (low, high), unit)
+    except SpringfootError as error:
+        number = as_float(value)
+        units = {factor: unit for unit, factor in MISTAKEN_PARAMETERS[name].items() if low <= number / factor <= high}
+        # Of several units the one that makes it most usual, the middle of the range in ratios.
+        guess = min(units, key=lambda factor: abs(log(number / factor / sqrt(low * high))), default=None)
+        raise SpringfootError(str(error) if guess is None else f"{error}: {units[guess]}?") from None
 
 
 def _lists_of(series: Mapping[str, NDArray]) -> dict[str, list]:

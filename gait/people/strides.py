@@ -1,7 +1,7 @@
 """Cut measured walks into strides: common time, heel strikes and toe-offs, curves over percent of each stride."""
 
-from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from ..body.leg_dynamics import FOOT_SEGMENT, joint_positions, segment_turns
 from ..body.rockers import turned
 from .gait_events import CONTACT_THRESHOLD_BW, Contacts, find_contacts, on_percent
 from .human import COLUMNS, FORCES
-from .motion_files import Series, Trial, refuse_impossible_angles
+from .motion_files import PARAMETERS, TIME_COLUMNS, Series, Trial, refuse_impossible_angles
 
 ANGLE_CURVES = ("thigh", "hip", "knee", "ankle", "toe")
 """Curves that need no force plate."""
@@ -23,6 +23,9 @@ LONGEST_TICK = 1 / 30
 """Longest time between samples [s]; chosen: a coarser sampling misses the time of a landing."""
 SHORTEST_TICK = 1e-3
 """Shortest time between samples [s]; chosen: finer sampling is thinned out to it."""
+SHORTEST_MISTAKEN_TICK = 0.25
+"""Time between samples from which on times are taken to be in ms, or numbers of frames [s]; chosen: nobody samples a
+walk so coarsely, and 0.25 ms are those of 4,000 Hz."""
 LONGEST_GAP = 0.1
 """Longest gap between samples that a straight line bridges [s]; chosen."""
 UNEVEN_STRIDE = 0.25
@@ -63,6 +66,10 @@ class MeasuredWalk:
     """Side -> events in a file."""
     speed: float | None
     """Walking speed [m/s]; None if no file has it."""
+    speed_column: str = PARAMETERS["speed"]
+    """Column that tells the speed."""
+    columns: Mapping[tuple[str, str], str] = field(default_factory=dict)
+    """(side, curve) -> its column in a file, of curves whose column is not that of `COLUMNS`."""
     notes: tuple[str, ...] = ()
     """Sentences on guesses and omissions."""
 
@@ -113,7 +120,9 @@ def merge_trials(trials: Sequence[Trial]) -> MeasuredWalk:
         gaps = np.diff(trial.time)
         if not len(gaps) or (tick := float(np.median(gaps))) > LONGEST_TICK * 1.001:  # times are rounded
             sampling = f"one every {tick:.3g} s" if len(gaps) else "a single one"
-            raise SpringfootError(f"{trial.name} must have at least 30 samples a second, has {sampling}")
+            column = next((name for name in TIME_COLUMNS if name in trial.columns), "time")
+            guess = f": {column} in ms, or frames?" if len(gaps) and tick >= SHORTEST_MISTAKEN_TICK else ""
+            raise SpringfootError(f"{trial.name} must have at least 30 samples a second, has {sampling}{guess}")
         if gaps.max() > LONGEST_GAP:
             longest = int(gaps.argmax())
             raise SpringfootError(
@@ -130,6 +139,7 @@ def merge_trials(trials: Sequence[Trial]) -> MeasuredWalk:
     # The factor: a last sample must not be lost to rounding.
     time = first + tick * np.arange(int((last - first) / tick * (1 + 1e-12)) + 1)
     legs: dict[str, Series] = {}
+    columns: dict[tuple[str, str], str] = {}
     unscaled = set()
     unsigned = {}  # side -> curves whose sign is that of the model's coordinate
     heading = -1.0 if any(trial.backward for trial in trials) else 1.0  # often another file's than the forces'
@@ -143,6 +153,8 @@ def merge_trials(trials: Sequence[Trial]) -> MeasuredWalk:
                     unsigned.setdefault(side, set()).add(curve)
                 if curve in trial.unscaled:
                     unscaled.add((side, curve))
+                if (side, curve) in trial.column_of:
+                    columns[side, curve] = trial.column_of[side, curve]
     notes = [note for trial in trials for note in trial.notes]
     for side, leg in legs.items():
         still = [curve for curve, values in leg.items() if curve not in FORCES and np.ptp(values) <= STILL]
@@ -162,7 +174,7 @@ def merge_trials(trials: Sequence[Trial]) -> MeasuredWalk:
                     unscaled.add((side, power))
     # Reversed: of several trials with a side's events the first counts, being the last to be put in.
     contacts = {side: events for trial in reversed(trials) for side, events in trial.contacts.items()}
-    speed = next((trial.speed for trial in trials if trial.speed is not None), None)
+    with_speed = next((trial for trial in trials if trial.speed is not None), trials[0])
     legs = {side: leg for side, leg in legs.items() if leg}
     if not legs:
         raise SpringfootError(f"{name}: no curve moves")
@@ -173,7 +185,9 @@ def merge_trials(trials: Sequence[Trial]) -> MeasuredWalk:
         legs=legs,
         unscaled=unscaled,
         contacts=contacts,
-        speed=speed,
+        speed=with_speed.speed,
+        speed_column=with_speed.speed_column,
+        columns=columns,
         notes=tuple(notes),
     )
 

@@ -181,16 +181,19 @@ BODY_WEIGHTS = times(vy=1 / MASS / GRAVITY, vx=1 / MASS / GRAVITY)
 OF_OPENSIM = {
     "degrees as radians": ({"says": "no"}, "degrees or radians?"),
     "radians as degrees": ({"degrees": False, "says": "yes"}, "radians?"),
-    "forces in body weights": (BODY_WEIGHTS, "are they in N?"),
-    "moments in N mm": (times(_moment=1e3), "N mm"),
-    "moments per kg": (times(_moment=1 / MASS), "times as far as people's"),
+    "forces in body weights": (BODY_WEIGHTS, "in body weights, not in N?"),
+    "forces in N/kg": (times(vy=1 / MASS, vx=1 / MASS), "in N/kg, not in N?"),
+    "forces in kN": (times(vy=1e-3, vx=1e-3), "in kN, not in N?"),
+    "moments in N mm": (times(_moment=1e3), "_moment goes from"),
+    "moments per kg": (times(_moment=1 / MASS), "times as far as people's: N m/kg where N m must be?"),
     "a flipped ankle": (FLIPPED, "opposite"),
 }
 WRONG = {
     **{f"{form}: {name}": (opensim, form, *case) for form in FORCE_NAMES for name, case in OF_OPENSIM.items()},
-    "one knee flipped": (opensim, "gait2392", times(knee_angle_r_moment=-1.0), "knee_moment"),
+    "one knee flipped": (opensim, "gait2392", times(knee_angle_r_moment=-1.0), "knee_angle_r_moment is opposite"),
     "flipped hips": (opensim, "Rajagopal", times(hip_flexion_r=-1.0, hip_flexion_l=-1.0), "behind at heel strike"),
-    "the pelvis in mm": (opensim, "OpenCap", times(pelvis_tx=1e3), "speed"),
+    "the pelvis in mm": (opensim, "OpenCap", times(pelvis_tx=1e3), "speed, of pelvis_tx, must be in [0.1, 4] m/s, got"),
+    "the pelvis in cm": (opensim, "OpenCap", times(pelvis_tx=1e2), ", got 130: cm/s?"),
     "forces downward": (opensim, "AddBiomechanics", times(vy=-1.0), "up must be positive"),
     "Visual3D: radians": (visual3d, None, {"angle": np.pi / 180}, "radians?"),
     "Visual3D: moments in N m": (visual3d, None, {"moment": MASS}, "N m, not per kg?"),
@@ -206,6 +209,36 @@ def test_wrong_units_and_signs_are_refused_with_a_guess(case, tmp_path):
     with pytest.raises(SpringfootError) as caught:
         read_person(written(maker, tmp_path))
     assert guess in str(caught.value) and "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("unit", [1e3, 1e2], ids=["ms", "frames"])
+def test_times_in_ms_or_frames_are_refused_with_a_guess(unit, tmp_path):
+    files = opensim("Rajagopal", tmp_path, kinetic=False)
+    lines = files[0].read_text(encoding="utf-8").splitlines()
+    begin = lines.index("endheader") + 2
+    rows = [line.split("\t", 1) for line in lines[begin:]]
+    scaled = [f"{unit * float(time):.6g}\t{rest}" for time, rest in rows]
+    files[0].write_text("\n".join([*lines[:begin], *scaled]) + "\n", encoding="utf-8")
+    every = unit / 100
+    with pytest.raises(SpringfootError, match=f"has one every {every:g} s: time in ms, or frames\\?$"):
+        read_person(files)
+
+
+@pytest.mark.parametrize(("height", "unit"), [(950.0, "mm"), (95.0, "cm")])
+def test_a_pelvis_in_mm_or_cm_is_refused_with_a_guess(height, unit, tmp_path):
+    columns = {"time": 0.01 * np.arange(9), "hip_flexion_r": np.arange(9), "pelvis_ty": np.full(9, height)}
+    path = write(tmp_path / "ik.mot", columns, ["inDegrees=yes", "endheader"])
+    with pytest.raises(
+        SpringfootError, match=f"ik.mot: pelvis_ty is {height:g} in the median, must be in m: {unit}\\?$"
+    ):
+        read_person([path])
+
+
+def test_a_column_is_named_as_the_user_named_it(tmp_path):
+    files = opensim("Rajagopal", tmp_path, wrong={"ankle_angle_r_moment": 1 / MASS})
+    files[2].write_text(files[2].read_text().replace("ankle_angle_r_moment", "Ankle R"))
+    with pytest.raises(SpringfootError, match=r"the right leg: Ankle R goes from .* N m/kg where N m must be\?"):
+        read_person(files, columns={"ankle_angle_r_moment": "Ankle R"})
 
 
 def test_there_are_as_many_right_and_wrong_files_as_were_asked_for():
@@ -320,8 +353,16 @@ def test_the_mass_that_was_given_and_the_one_the_forces_bear(tmp_path):
     assert measured.mass == 90.0 and any("The forces bear 7" in note and "not 90" in note for note in measured.notes)
     alone = read_person([tmp_path / "ik.mot", tmp_path / "id.sto"])
     assert alone.mass is None and any("--mass" in note for note in alone.notes)
+    assert not any("too little for N m" in note for note in alone.notes)
     weighed = read_person([tmp_path / "ik.mot", tmp_path / "id.sto"], mass=MASS)
     assert "ankle_moment" in weighed.legs["left"].curves and FORCES[0] not in weighed.legs["left"].curves
+
+
+def test_moments_too_small_for_newton_metres_are_told(tmp_path):
+    angles, _, moments = opensim("Rajagopal", tmp_path, wrong={"_moment": 1 / MASS})
+    told = read_person([angles, moments]).notes[-1]
+    assert told.startswith("The largest of ankle_angle_l_moment and ankle_angle_r_moment is 1.")
+    assert told.endswith("too little for N m: in N m/kg?")
 
 
 def test_one_side_of_an_uneven_walk_is_divided_by_the_mass_that_both_feet_bear(tmp_path):

@@ -233,6 +233,27 @@ def test_mean_curves_over_percent_come_back_to_rounding(tmp_path):
         np.testing.assert_allclose(gait.mean(name, PHASE), HUMAN.mean(name, PHASE), atol=0.01)
 
 
+@pytest.mark.parametrize(
+    ("column", "value", "words"),
+    [
+        ("speed_m_s", 1300.0, "speed must be in [0.1, 4] m/s, got 1300: mm/s?"),
+        ("speed_m_s", 130.0, "got 130: cm/s?"),
+        ("speed_m_s", 4.7, "got 4.7: km/h?"),
+        ("stride_time_s", 1050.0, "stride_time must be in [0.4, 4] s, got 1050: ms?"),
+        ("step_length_m", 680.0, "step_length must be in [0.05, 2] m, got 680: mm?"),
+        ("step_length_m", 68.0, "got 68: cm?"),
+        ("toe_off_percent", 0.62, "[0.3, 0.9] of the stride, got 0.0062: a fraction, where percent must be?"),
+        ("stride_time_s", 9.0, "stride_time must be in [0.4, 4] s, got 9"),
+    ],
+)
+def test_a_number_beside_mean_curves_in_another_unit_is_refused_with_a_guess(column, value, words, tmp_path):
+    changes: dict[str, Any] = {column: np.full(101, value)}
+    path = gait_csv(tmp_path / "mean.csv", **changes)
+    with pytest.raises(SpringfootError) as caught:
+        read_gait(path, trust_units=True)
+    assert str(caught.value).endswith(words)
+
+
 def test_thigh_follows_from_hip_and_pelvis(tmp_path):
     tilt = np.degrees(HUMAN.mean("hip", PHASE) - HUMAN.mean("thigh", PHASE))
     path = gait_csv(tmp_path / "mean.csv", thigh_flexion_deg=None, pelvis_anterior_tilt_deg=tilt)
