@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 from springfoot.lazy import lazy_names
 
 if TYPE_CHECKING:
+    from .checks import AS_IT_IS
     from .gait_events import CONTACT_THRESHOLD_BW, PERCENT, Contacts, find_contacts, find_steps, on_percent, sample
     from .human import COLUMNS, HumanGait, human_gait
-    from .measured_person import MeasuredPerson, read_person
+    from .measured_person import PARTLY, MeasuredPerson, read_person
     from .motion_files import FILE_CURVES
     from .own_data import read_gait
     from .scores import (
@@ -24,11 +25,13 @@ if TYPE_CHECKING:
     from .strides import FILTER
 
 __all__ = [
+    "AS_IT_IS",
     "COLUMNS",
     "CONTACT_THRESHOLD_BW",
     "FILE_CURVES",
     "FILTER",
     "LOADING_END_PERCENT",
+    "PARTLY",
     "PERCENT",
     "PUSH_OFF_BEGIN_PERCENT",
     "Contacts",
@@ -52,10 +55,12 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
     __getattr__ = lazy_names(
         __name__,
         {
+            "AS_IT_IS": "checks",
             "COLUMNS": "human",
             "FILTER": "strides",
             "FILE_CURVES": "motion_files",
             "MeasuredPerson": "measured_person",
+            "PARTLY": "measured_person",
             "read_person": "measured_person",
             "CONTACT_THRESHOLD_BW": "gait_events",
             "LOADING_END_PERCENT": "scores",

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from springfoot.arrays import NDArray
 from springfoot.errors import SpringfootError, require_within
 from springfoot.files.text_table import Table
 
@@ -20,9 +21,11 @@ from .own_data import (
     gait_of_percents,
     gait_of_walk,
     one_condition,
+    people_at,
     percent_curves,
     read_files,
 )
+from .scores import LOADING_END_PERCENT
 from .strides import LegStrides, MeasuredWalk, borne_mass, force_delay, strides_of_legs
 
 MASSES_APART = 1.1
@@ -30,6 +33,14 @@ MASSES_APART = 1.1
 CLOCKS_APART = 0.06
 """Largest time between forces and motion that gets no note [s]; chosen. Right files have 0.03 s at most: people
 at 0.85 to 1.9 m/s, and walks here on sound, weak, passive, rigid and dropping feet."""
+PARTLY = (
+    "a foot was partly off its plate, as its force ends before the foot leaves the ground, does not reach 0.9 body "
+    "weights, or both feet together do not bear the body in a step"
+)
+"""Words on `LegStrides.partly`."""
+SLOW_RISE = 0.6
+"""Rate at which the vertical force rises at heel strike, over people's at that speed, below which the report asks for
+smoothing [-]; chosen. Walks here have 0.68 and more, behind a low-pass at 6 Hz 0.3 to 0.55 on most feet."""
 FORCE_UNIT_OFF = 0.1
 """Largest difference of the borne weight from that of a unit, for the unit to be the guess [-]; chosen."""
 SMALLEST_NM = 6.0
@@ -116,13 +127,14 @@ def read_person(
             notes.append(f"{table.name} has a row every 2 % of the stride: {COARSE}.")
         borne = None
     else:
-        walk: MeasuredWalk = read if speed is None else replace(read, speed=speed)
+        walk = replace(read, trusted=trust_units, speed=read.speed if speed is None else speed)
         if skip is None:
             skip = WARM_UP if walk.last - walk.first >= LONG_WALK else 0.0
         if skip:
             walk = walk.without_start(skip)
             notes.append(f"Left out: the first {skip:g} s.")
-        borne = borne_mass(walk)
+        by_forces = borne_mass(walk)
+        borne = by_forces.mass if by_forces else None
         if mass is None and borne is not None:
             low, high = MASS_RANGE
             if not low <= borne <= high:
@@ -133,6 +145,10 @@ def read_person(
         gait = gait_of_walk(walk, side, mass, trust_units)
         legs = {leg: strides for leg, strides in strides_of_legs(walk, side, mass).items() if len(strides.times)}
         notes += walk.notes
+        notes += _notes_on_plates(walk, legs)
+        if mass is None and by_forces and len(by_forces.legs) < len(walk.legs):
+            alone = by_forces.legs[0]
+            notes.append(f"The mass is from the force of the {alone} foot alone, taken to bear half of the body.")
         delay = force_delay(walk, side)
         if delay is not None and abs(delay) > CLOCKS_APART:
             late = "later" if delay > 0 else "earlier"
@@ -152,6 +168,34 @@ def read_person(
     return MeasuredPerson(
         gait=gait, legs=legs, mass=borne if mass is None else mass, mass_from=mass_from, notes=tuple(notes)
     )
+
+
+def _notes_on_plates(walk: MeasuredWalk, legs: Mapping[str, LegStrides]) -> list[str]:
+    """Return sentences on strides left out as a foot was partly off its plate, and on forces that rise slowly."""
+    notes = []
+    partly = [f"{count} {side}".strip() for side, leg in legs.items() if (count := int(leg.partly.sum()))]
+    if partly:
+        notes.append(f"Forces and moments of {', '.join(partly)} strides left out: {PARTLY}.")
+    people = _rise(people_at(walk.speed).mean("grf_vertical", PERCENT / 100))
+    rises = {
+        side: _rise(leg.counted("grf_vertical").mean(axis=0)) / people
+        for side, leg in legs.items()
+        if "grf_vertical" in leg.curves and leg.weighed.any()
+    }
+    if slow := {side: rise for side, rise in rises.items() if rise < SLOW_RISE}:
+        words = " and ".join(f"{100 * rise:.0f} % {side}".strip() for side, rise in slow.items())
+        notes.append(
+            f"The vertical force rises at heel strike at {words} of people's rate: was it smoothed? In a walk here "
+            "a low-pass at 6 Hz made quasi-stiffness a third to a half too low in the first 6 % of the stride, and a "
+            "fifth too high in late mid-stance."
+        )
+    return notes
+
+
+def _rise(vertical: NDArray) -> float:
+    """Return the largest rise of a vertical force (101,) within 2 % of the stride in the loading response."""
+    loading = vertical[: LOADING_END_PERCENT + 1]
+    return float((loading[2:] - loading[:-2]).max())
 
 
 def _columns_of(walk: MeasuredWalk, curve: str) -> str:

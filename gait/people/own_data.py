@@ -241,7 +241,7 @@ def gait_of_percents(table: Table, side: str, trust_units: bool) -> OwnGait:
         for leg in FILE_SIDES:
             if leg in legs and leg in chosen:
                 known = {curve: values for curve, values in legs[leg].items() if curve in COLUMNS}
-                require_plausible(f"{table.name}, the {leg} leg", known, _people_at(None))
+                require_plausible(f"{table.name}, the {leg} leg", known, people_at(None))
     mean: Series = {}
     sd: Series = {}
     for kind, of_kind in ((mean, legs), (sd, spreads)):
@@ -313,6 +313,7 @@ def one_condition(table: Table, condition: str | None) -> Table:
 def gait_of_walk(walk: MeasuredWalk, side: str, mass: float | None, trust_units: bool) -> OwnGait:
     """Return the mean gait of a walk's strides, or raise `SpringfootError` for curves that no walk has."""
     _require_side(side)
+    walk = replace(walk, trusted=trust_units)
     if walk.speed is not None:
         _require_accepted(f"{walk.name}: speed, of {walk.speed_column},", "speed", walk.speed)
     strides, curves = cut_strides(walk, side, mass)  # strides: heel strike, toe-off, next heel strike
@@ -324,7 +325,7 @@ def gait_of_walk(walk: MeasuredWalk, side: str, mass: float | None, trust_units:
                 f"{walk.name}: the {name} is behind at heel strike; are left and right, or a sign, interchanged?"
             )
     if not trust_units:
-        require_plausible_legs(walk, side, mass, _people_at(walk.speed))
+        require_plausible_legs(walk, side, mass, people_at(walk.speed))
     duration = strides[:, 2] - strides[:, 0]
     stride_time = float(np.mean(duration))
     gait = OwnGait(
@@ -352,7 +353,7 @@ def _require_one_speed(gait: OwnGait) -> None:
             )
 
 
-def _people_at(speed: float | None) -> HumanGait:
+def people_at(speed: float | None) -> HumanGait:
     """Return people's gait at a speed [m/s]; at a comfortable one if it is unknown or outside the accepted range."""
     low, high, _ = ACCEPTED["speed"]
     return human_gait(speed if speed and low <= speed <= high else COMFORTABLE_SPEED)
@@ -373,7 +374,7 @@ def _with_series(gait: OwnGait, mean: Series, sd: Series, trust_units: bool, mas
 
     refuse_impossible_angles(gait.name, mean)
     if not trust_units:
-        require_plausible(gait.name, mean, _people_at(gait.speed), sd, mass_given)
+        require_plausible(gait.name, mean, people_at(gait.speed), sd, mass_given)
         _require_one_speed(gait)
     gait = _checked_gait(gait)
     return _checked_gait(replace(gait, mean=_arrays_of("mean", fit(mean)), sd=_arrays_of("sd", fit(sd))))

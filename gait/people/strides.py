@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,9 +12,9 @@ from springfoot.errors import SpringfootError
 from ..body.body import GRAVITY, Body
 from ..body.leg_dynamics import FOOT_SEGMENT, joint_positions, segment_turns
 from ..body.rockers import turned
-from .gait_events import CONTACT_THRESHOLD_BW, Contacts, find_contacts, on_percent
+from .gait_events import CONTACT_THRESHOLD_BW, Contacts, find_contacts, next_after, on_percent, sample
 from .human import COLUMNS, FORCES
-from .motion_files import PARAMETERS, TIME_COLUMNS, Series, Trial, refuse_impossible_angles
+from .motion_files import FILE_SIDES, PARAMETERS, TIME_COLUMNS, Series, Trial, refuse_impossible_angles
 
 ANGLE_CURVES = ("thigh", "hip", "knee", "ankle", "toe")
 """Curves that need no force plate."""
@@ -45,7 +46,18 @@ WEIGHT_BEARING = (15, 45)
 ABRUPT_UNLOADING = 0.7
 """Fall of the vertical force within 2 % of the stride that no foot shows [body weights]; chosen: adults' mean force
 falls by 0.21 to 0.30 at 0.85 to 1.96 m/s (Bovi et al. 2011), walks here on constant springs by more than 0.45, and a
-foot that rolls off a plate loses all of it. Edges are missed where the force has fallen further, or is smoothed."""
+foot that rolls off a plate loses all of it."""
+LEAST_PEAK = 0.9
+"""Least peak of the vertical force of a foot that stands wholly on its plate [body weights]; chosen: alone on the
+ground it bears about the body. Adults' mean force peaks at 1.06 to 1.32 at 0.85 to 1.96 m/s, walks here at 1.08 and
+more."""
+EARLY_END = 0.06
+"""Most by which the force of a whole stance ends before the motion of the foot tells its toe-off [strides]; chosen: it
+does by 0.01 to 0.044 in walks here, on sound, weak, passive and rigid feet and slopes of 5 deg."""
+WEIGHT_OFF = 0.05
+"""Largest difference of the mean vertical force of both feet over a step from the body's weight, over it; chosen. More
+than that would change the body's vertical velocity by 0.05 g times the step's 0.55 s, 0.27 m/s. Steps here, with any
+feet and 100 N pushes, differ by 0.035 at most, those of 200 N pushes by 0.08."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -70,6 +82,8 @@ class MeasuredWalk:
     """Column that tells the speed."""
     columns: Mapping[tuple[str, str], str] = field(default_factory=dict)
     """(side, curve) -> its column in a file, of curves whose column is not that of `COLUMNS`."""
+    trusted: bool = False
+    """True to count all strides on a plate, though a part of the force may be missing, as of walkers with a cane."""
     notes: tuple[str, ...] = ()
     """Sentences on guesses and omissions."""
 
@@ -98,6 +112,8 @@ class LegStrides:
     weighed: NDArray
     """(S,) True for strides whose forces and moments count: none but those on a force plate, where the file has
     forces."""
+    partly: NDArray = field(default_factory=lambda: np.zeros(0, bool))
+    """(S,) True for strides on a force plate that do not count, as a part of the force is missing."""
 
     def counted(self, curve: str) -> NDArray:
         """Return `curve` over percent of the strides that count for it, (s, 101).
@@ -211,8 +227,9 @@ def cut_strides(walk: MeasuredWalk, side: str = "both", mass: float | None = Non
 
 def strides_of_legs(walk: MeasuredWalk, side: str = "both", mass: float | None = None) -> dict[str, LegStrides]:
     """Cut each leg of a walk into strides; arguments and errors as of `cut_strides`."""
-    mass = borne_mass(walk) if mass is None else mass
-    legs = _legs_as_read(walk, side)
+    legs = _legs_as_read(walk, side, mass)
+    borne = borne_mass(walk) if mass is None else None
+    mass = borne.mass if borne else mass
     return {
         name: replace(leg, curves=_scaled_curves(leg.curves, name, walk.unscaled, mass)) for name, leg in legs.items()
     }
@@ -226,37 +243,124 @@ def require_side(name: str, legs: Collection[str], side: str) -> None:
         raise SpringfootError(f"{name} has no {side} leg, only {only}: side must be {allowed}")
 
 
-def _legs_as_read(walk: MeasuredWalk, side: str) -> dict[str, LegStrides]:
-    """Cut each leg of a walk into strides, their curves in the units of the files.
-
-    The threshold of contact is first of about the body weight, then of that which these strides bear.
-    """
-    legs = _legs_by_weight(walk, side, None)
-    weight = _borne_weight(legs.values())
-    return legs if weight is None else _legs_by_weight(walk, side, weight)
-
-
-def _legs_by_weight(walk: MeasuredWalk, side: str, weight: float | None) -> dict[str, LegStrides]:
+def _legs_as_read(walk: MeasuredWalk, side: str, mass: float | None = None) -> dict[str, LegStrides]:
     """Cut each leg of `side` (both, left, right) into strides, their curves in the units of the files.
 
-    `weight` is that of the body in the unit of the forces, for the threshold of contact; None: estimated from a force.
+    The threshold of contact is first of about the body weight, then of that which the strides of all legs bear. `mass`
+    [kg], if it is known, is that of a body of which one foot alone was on a plate.
     """
     require_side(walk.name, walk.legs, side)
-    chosen = {name: leg for name, leg in walk.legs.items() if side in ("both", name)}
-    strides = {name: _strides_of_leg(walk, name, weight) for name in chosen}
-    if sum(map(len, strides.values())) < FEWEST_STRIDES:
-        count = sum(map(len, strides.values()))
+    legs = _legs_by_weight(walk, None)
+    weight = _borne_weight(legs.values())
+    if weight is not None:
+        legs = _legs_by_weight(walk, weight)
+    if weight is not None and not walk.trusted:
+        plates = [name for name, leg in legs.items() if "grf_vertical" in leg.curves and leg.weighed.any()]
+        if mass is not None and len(plates) == 1 and (plates[0], "grf_vertical") in walk.unscaled:
+            weight = mass * GRAVITY
+        for name in plates:
+            legs[name] = _without_strides(legs[name], ~_stands_whole(walk, name, legs[name], weight))
+        light = _light_steps(walk, legs, weight)
+        legs = {name: _without_strides(leg, _steps_in(leg.times, light).sum(axis=1) > 0) for name, leg in legs.items()}
+        legs = {name: replace(leg, times=_mended_toe_offs(walk, name, leg)) for name, leg in legs.items()}
+    legs = {name: leg for name, leg in legs.items() if side in ("both", name)}
+    if (count := sum(len(leg.times) for leg in legs.values())) < FEWEST_STRIDES:
         raise SpringfootError(
             f"{walk.name}: needs at least {FEWEST_STRIDES} complete strides, has {count} "
             "(they are found in grf_vertical, events, or thigh or hip with knee)"
         )
-    legs = {}
-    for name, leg in chosen.items():
-        begin, _, end = strides[name].T
-        curves = {curve: on_percent(series, begin, end, walk.tick, walk.first) for curve, series in leg.items()}
-        weighed = _on_plate(curves["grf_vertical"]) if "grf_vertical" in curves else np.full(len(begin), True)
-        legs[name] = LegStrides(times=strides[name], curves=curves, weighed=weighed)
     return legs
+
+
+def _legs_by_weight(walk: MeasuredWalk, weight: float | None) -> dict[str, LegStrides]:
+    """Cut each leg of a walk into strides, their curves in the units of the files.
+
+    `weight` is that of the body in the unit of the forces, for the threshold of contact; None: estimated from a force.
+    """
+    legs = {}
+    for name, leg in walk.legs.items():
+        times = _strides_of_leg(walk, name, weight)
+        begin, _, end = times.T
+        curves = {curve: on_percent(series, begin, end, walk.tick, walk.first) for curve, series in leg.items()}
+        legs[name] = LegStrides(
+            times=times, curves=curves, weighed=np.full(len(begin), True), partly=np.full(len(begin), False)
+        )
+        if "grf_vertical" in curves:
+            on_plate = _on_plate(curves["grf_vertical"], weight)
+            legs[name] = _without_strides(
+                replace(legs[name], weighed=on_plate), _ends_abruptly(curves["grf_vertical"], weight)
+            )
+    return legs
+
+
+def _stands_whole(walk: MeasuredWalk, name: str, leg: LegStrides, weight: float) -> NDArray:
+    """Return (S,) True for strides of the leg `name` whose force reaches `LEAST_PEAK` and lasts as long as the foot's
+    motion says (`EARLY_END`); `weight` is the body's, in the unit of the force."""
+    whole = leg.curves["grf_vertical"].max(axis=1, initial=0.0) >= LEAST_PEAK * weight
+    motion = _contacts_of_motion(walk, walk.legs[name])
+    if motion is None or not len(motion.heel_strikes) or not len(motion.toe_offs):
+        return whole
+    begin, off, end = leg.times.T
+    late_strike = _lateness(begin, motion.heel_strikes) / (end - begin)
+    late_off = _lateness(off, motion.toe_offs) / (end - begin)
+    # Another clock moves heel strike and toe-off alike; at the ends of a record the nearest strike may be the next one.
+    late_clock = np.where(np.abs(late_strike) < 0.5, np.minimum(late_strike, 0.0), 0.0)
+    return whole & (late_off - late_clock > -EARLY_END)
+
+
+def _light_steps(walk: MeasuredWalk, legs: Mapping[str, LegStrides], weight: float) -> NDArray:
+    """Return heel strike and next heel strike of the other foot (P, 2) [s] of steps in which the feet do not bear the
+    body: their mean vertical force is off that of whole strides by `WEIGHT_OFF`.
+
+    A step is looked at if a stride of each foot that was on a plate has it in it. `weight` is the body's, in the unit
+    of the forces, if no stride has two such steps.
+    """
+    if set(legs) != set(FILE_SIDES) or any("grf_vertical" not in leg for leg in walk.legs.values()):
+        return np.empty((0, 2))
+    total = np.sum([walk.legs[side]["grf_vertical"] for side in FILE_SIDES], axis=0)
+    impulse = walk.tick * np.concatenate([[0.0], np.cumsum((total[1:] + total[:-1]) / 2)])
+
+    def borne(times: NDArray) -> NDArray:
+        """Return the mean force of both feet between the `times` (N, 2) [s]."""
+        return np.diff(sample(impulse, times, walk.tick, walk.first))[:, 0] / np.diff(times)[:, 0]
+
+    strides = {side: legs[side].times[legs[side].weighed][:, [0, 2]] for side in FILE_SIDES}
+    steps = [
+        (begin, end)
+        for ahead, behind in (FILE_SIDES, FILE_SIDES[::-1])
+        for begin, _ in strides[ahead]
+        for start, end in strides[behind]
+        if start < begin < end
+    ]
+    if not steps:
+        return np.empty((0, 2))
+    times = np.array(steps)
+    whole = np.concatenate([*strides.values()])
+    whole = whole[_steps_in(whole, times).sum(axis=1) == len(FILE_SIDES)]
+    if len(whole):
+        # Plates lose force and never make any: the weight is nearer to the largest than to the mean.
+        weight = float(np.quantile(borne(whole), 0.9))
+    return times[np.abs(borne(times) / weight - 1.0) > WEIGHT_OFF]
+
+
+def _steps_in(strides: NDArray, steps: NDArray) -> NDArray:
+    """Return (S, P) True where a step (P, 2) lies within a stride, (S, 2) or (S, 3) [s]."""
+    return (strides[:, :1] <= steps[:, 0]) & (steps[:, 1] <= strides[:, -1:])
+
+
+def _without_strides(leg: LegStrides, off: NDArray) -> LegStrides:
+    """Return a leg of which the strides `off` (S,), if they count for forces, do so no more."""
+    return replace(leg, weighed=leg.weighed & ~off, partly=leg.partly | (leg.weighed & off))
+
+
+def _mended_toe_offs(walk: MeasuredWalk, name: str, leg: LegStrides) -> NDArray:
+    """Return the times (S, 3) of a leg's strides, toe-off by the foot's motion where a part of the force is missing."""
+    motion = _contacts_of_motion(walk, walk.legs[name]) if leg.partly.any() else None
+    if motion is None:
+        return leg.times
+    begin, off, end = leg.times.T
+    moved = next_after(motion.toe_offs, begin)
+    return np.stack([begin, np.where(leg.partly & (moved < end), moved, off), end], axis=-1)
 
 
 def _borne_weight(legs: Iterable[LegStrides]) -> float | None:
@@ -273,11 +377,21 @@ def _borne_weight(legs: Iterable[LegStrides]) -> float | None:
     return 2 * float(np.mean(borne)) if borne else None
 
 
-def borne_mass(walk: MeasuredWalk) -> float | None:
-    """Return the mass that the vertical forces of all legs bear over whole strides [kg]; None without forces in N."""
-    legs = _legs_as_read(walk, "both")
-    weight = _borne_weight(leg for name, leg in legs.items() if (name, "grf_vertical") in walk.unscaled)
-    return None if weight is None else weight / GRAVITY
+class BorneMass(NamedTuple):
+    """Mass that the vertical forces bear over whole strides."""
+
+    mass: float
+    """[kg]."""
+    legs: tuple[str, ...]
+    """Legs whose forces tell it."""
+
+
+def borne_mass(walk: MeasuredWalk) -> BorneMass | None:
+    """Return the mass that the vertical forces of all legs bear over whole strides; None without forces in N."""
+    legs = {name: leg for name, leg in _legs_as_read(walk, "both").items() if (name, "grf_vertical") in walk.unscaled}
+    weight = _borne_weight(legs.values())
+    weighed = tuple(name for name, leg in legs.items() if leg.weighed.any())
+    return None if weight is None else BorneMass(weight / GRAVITY, weighed)
 
 
 def _strides_of_leg(walk: MeasuredWalk, side: str, weight: float | None) -> NDArray:
@@ -326,17 +440,17 @@ def force_delay(walk: MeasuredWalk, side: str = "both") -> float | None:
     for name, leg in walk.legs.items():
         by_force, by_motion = _contacts_of_force(walk, leg, None), _contacts_of_motion(walk, leg)
         if side in ("both", name) and by_force is not None and by_motion is not None:
-            strikes += _delays(by_force.heel_strikes, by_motion.heel_strikes)
-            offs += _delays(by_force.toe_offs, by_motion.toe_offs)
+            strikes += [*_lateness(by_force.heel_strikes, by_motion.heel_strikes)]
+            offs += [*_lateness(by_force.toe_offs, by_motion.toe_offs)]
     if not strikes or not offs:
         return None
     delays = (float(np.median(strikes)), float(np.median(offs)))
     return min(delays, key=abs) if delays[0] * delays[1] > 0 else 0.0
 
 
-def _delays(times: NDArray, others: NDArray) -> list[float]:
-    """Return how much later each of `times` is than the nearest of `others` [s]; nothing without `others`."""
-    return [float(time - others[np.abs(others - time).argmin()]) for time in times] if len(others) else []
+def _lateness(times: NDArray, others: NDArray) -> NDArray:
+    """Return how much later each of `times` (N,) is than the nearest of `others` [s]; nothing without `others`."""
+    return times - others[np.abs(others - times[:, None]).argmin(axis=1)] if len(others) else np.empty(0)
 
 
 def _events_of_motion(thigh: NDArray, knee: NDArray, ankle: NDArray, tick: float, first: float) -> Contacts:
@@ -388,14 +502,19 @@ def _body_weight(force: NDArray) -> float:
     return float(np.median(force[force > 0.5 * force.max()])) if force.max(initial=0.0) > 0 else 1.0
 
 
-def _on_plate(vertical: NDArray) -> NDArray:
-    """Return (S,) True for strides whose stance was on a force plate; `vertical` (S, 101) is their vertical force."""
-    weight = _body_weight(vertical)
+def _on_plate(vertical: NDArray, weight: float | None) -> NDArray:
+    """Return (S,) True for strides whose stance was on a force plate; `vertical` (S, 101) is their vertical force, and
+    `weight` as of `_legs_by_weight`."""
     low, high = WEIGHT_BEARING
     # A foot on a plate bears most of the body weight there; 0.3 of it is beyond what noise shows.
-    bears = vertical[:, low : high + 1].min(axis=1, initial=np.inf) > 0.3 * weight
-    fall = vertical[:, low:-2] - vertical[:, low + 2 :]  # within 2 %
-    return bears & (fall.max(axis=1, initial=-np.inf) < ABRUPT_UNLOADING * weight)
+    return vertical[:, low : high + 1].min(axis=1, initial=np.inf) > 0.3 * (weight or _body_weight(vertical))
+
+
+def _ends_abruptly(vertical: NDArray, weight: float | None) -> NDArray:
+    """Return (S,) True for strides whose force falls by `ABRUPT_UNLOADING` at once; arguments as of `_on_plate`."""
+    begin = WEIGHT_BEARING[0]
+    fall = vertical[:, begin:-2] - vertical[:, begin + 2 :]  # within 2 %
+    return fall.max(axis=1, initial=-np.inf) >= ABRUPT_UNLOADING * (weight or _body_weight(vertical))
 
 
 def _scaled_curves(curves: Series, side: str, unscaled: Collection[tuple[str, str]], mass: float | None) -> Series:

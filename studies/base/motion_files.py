@@ -39,7 +39,7 @@ class MotionFiles(Study):
     """Time at the start of the files that does not count [s]; None takes 3 s, as evaluations do, of walks of 10 s and
     more."""
     trust_units: tyro.conf.FlagCreatePairsOff[bool] = False
-    """Take the files as they are, even if units or signs look wrong."""
+    """Take the files as they are, even if units or signs look wrong, or forces seem to miss a part, as with a cane."""
 
     REPEATABLE: ClassVar[Collection[str]] = frozenset({"--columns"})
 

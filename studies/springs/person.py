@@ -23,7 +23,7 @@ from springfoot.files.markdown import MISSING, table, text_of
 from springfoot.files.writing import csv_text
 from springfoot.gait import Body, HumanGait, human_gait, schedule_from_curves
 from springfoot.gait.body import REFERENCE_MASS, TOE_STIFFNESS
-from springfoot.gait.people import FILE_CURVES, FILTER, PERCENT, MeasuredPerson
+from springfoot.gait.people import AS_IT_IS, FILE_CURVES, FILTER, PARTLY, PERCENT, MeasuredPerson
 from springfoot.gait.springs import (
     LOWEST_STIFFNESS,
     SPRINGS,
@@ -104,6 +104,9 @@ class _Sheet:
                 f"{measured.gait.name}: no ankle angle, such as {FILE_CURVES['ankle']} or ankle_angle_r; "
                 "--columns names it if it is called otherwise"
             )
+        legs = measured.legs.values()
+        if any(leg.partly.any() for leg in legs) and not any(leg.weighed.any() for leg in legs):
+            raise SpringfootError(f"{measured.gait.name}: no stride tells a stiffness: in each {PARTLY}; {AS_IT_IS}")
 
     @property
     def _unit(self) -> str:

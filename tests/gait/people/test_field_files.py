@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.signal import butter, sosfiltfilt
 
 from springfoot.gait import GRAVITY, SpringfootError, human_gait
 from springfoot.gait.people.human import COLUMNS, FORCES
@@ -346,6 +347,98 @@ def test_a_plate_that_ends_under_the_foot_weighs_no_stride(end, tmp_path):
     files[1].write_text("\n".join(lines) + "\n")
     cut = read_person(files).legs["left"]
     assert whole.weighed.all() and not cut.weighed[1] and cut.weighed[2:].all()
+
+
+def smoothed(values, cutoff=6.0):
+    """Columns after a low-pass without delay, as laboratories filter forces."""
+    return sosfiltfilt(butter(2, cutoff, fs=100.0, output="sos"), values, axis=0)
+
+
+def half_off(columns, stance):
+    """Seven tenths of the force: the rest of the foot is beside the plate."""
+    return np.where(stance[:, None] < 1.0, 0.7 * columns, columns)
+
+
+def cut_short(columns, stance):
+    """A plate that ends under the foot at 48 % of the stride, and a filter that hides the edge."""
+    return np.where(stance[:, None] < 0.95, smoothed(np.where(stance[:, None] > 0.48, 0.0, columns)), columns)
+
+
+def damaged(files, side, strides, damage):
+    """Change force and moments of a side in some strides (S, 3) as `damage` does, and write the files again."""
+    for path in files[1:]:
+        lines = path.read_text(encoding="utf-8").splitlines()
+        begin = lines.index("endheader") + 1
+        names = lines[begin].split("\t")
+        rows = np.array([line.split("\t") for line in lines[begin + 1 :]], float)
+        own = [k for k, name in enumerate(names) if f"calcn_{side}_v" in name or name.endswith(f"_{side}_moment")]
+        for strike, _, following in strides:
+            stance = (rows[:, 0] - strike + 1e-9) / (following - strike)
+            rows[:, own] = np.where(
+                stance[:, None] >= 0.0, damage(rows[:, own], np.where(stance < 0.0, 9.0, stance)), rows[:, own]
+            )
+        text = ["\t".join(f"{value:.6g}" for value in row) for row in rows]
+        path.write_text("\n".join([*lines[: begin + 1], *text]) + "\n", encoding="utf-8")
+    return files
+
+
+def slopes(measured, side, strides):
+    """Quasi-stiffness of the ankle in the phases of stance, from some of the strides."""
+    leg = measured.legs[side]
+    angle, moment = (leg.curves[name][strides] for name in ("ankle", "ankle_moment"))
+    phases = stance_phases("ankle", angle.mean(axis=0), measured.toe_off(side))
+    return [slope.value for phase in phases if (slope := phase_slope(angle, measured.mass * moment, phase))]
+
+
+@pytest.mark.parametrize("damage", [half_off, cut_short])
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_strides_in_which_a_plate_loses_force_are_left_out_and_told(side, damage, tmp_path):
+    files = opensim("AddBiomechanics", tmp_path)
+    whole = read_person(files)
+    assert all(leg.weighed.all() and not leg.partly.any() for leg in whole.legs.values())
+    strides = whole.legs[side].times
+    cut = read_person(damaged(files, side[0], strides[1:2], damage))
+    leg = cut.legs[side]
+    assert leg.partly[1] and not leg.weighed[1] and leg.weighed[2:].any()
+    assert cut.mass == pytest.approx(whole.mass, rel=0.01)
+    assert cut.toe_off(side) == pytest.approx(whole.toe_off(side), abs=0.01)
+    # In controlled plantarflexion the slope is near 0: 2 N m/rad are its noise.
+    np.testing.assert_allclose(slopes(cut, side, leg.weighed), slopes(whole, side, leg.weighed), rtol=0.02, atol=2.0)
+    (told,) = (note for note in cut.notes if "off its plate" in note)
+    assert told.startswith("Forces and moments of ") and f"{leg.partly.sum()} {side}" in told
+
+
+@pytest.mark.parametrize("damage", [half_off, cut_short])
+def test_a_plate_that_loses_force_in_every_stride_tells_no_stiffness(damage, tmp_path):
+    files = opensim("AddBiomechanics", tmp_path)
+    strides = read_person(files).legs["left"].times
+    leg = read_person(damaged(files, "l", strides, damage)).legs["left"]
+    assert leg.partly[:-1].all() and leg.weighed[:-1].sum() == 0
+    trusted = read_person(files, trust_units=True).legs["left"]
+    assert trusted.weighed.all() and not trusted.partly.any()
+
+
+@pytest.mark.parametrize("speed", [0.9, 1.3, 1.7])
+def test_smoothed_forces_are_told(speed, tmp_path):
+    files = opensim("AddBiomechanics", tmp_path, speed=speed)
+    assert not any("smoothed" in note for note in read_person(files).notes)
+    lines = files[1].read_text(encoding="utf-8").splitlines()
+    begin = lines.index("endheader") + 2
+    rows = np.array([line.split("\t") for line in lines[begin:]], float)
+    rows[:, 1:] = smoothed(rows[:, 1:])
+    text = ["\t".join(f"{value:.6g}" for value in row) for row in rows]
+    files[1].write_text("\n".join([*lines[:begin], *text]) + "\n", encoding="utf-8")
+    (told,) = (note for note in read_person(files).notes if "smoothed" in note)
+    assert " % left and " in told and "of people's rate" in told
+
+
+def test_the_mass_of_one_plate_is_told(tmp_path):
+    files = opensim("AddBiomechanics", tmp_path)
+    files[1].write_text(files[1].read_text().replace("calcn_r_v", "other_v"), encoding="utf-8")
+    measured = read_person(files)
+    assert measured.mass == pytest.approx(MASS, rel=0.06)
+    assert any("the force of the left foot alone" in note for note in measured.notes)
+    assert not any("foot alone" in note for note in read_person(files, mass=MASS).notes)
 
 
 def test_the_mass_that_was_given_and_the_one_the_forces_bear(tmp_path):

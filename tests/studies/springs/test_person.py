@@ -14,6 +14,7 @@ from springfoot.evaluation.recording.recording import WARM_UP, record
 from springfoot.evaluation.report.exports import write_opensim
 from springfoot.gait import human_gait
 from springfoot.gait.people.human import COLUMNS
+from springfoot.gait.people.measured_person import read_person
 from springfoot.gait.people.own_data import read_gait
 
 PHASE = np.linspace(0, 1, 101)
@@ -68,6 +69,52 @@ def test_planted_truth_comes_back(policy, given, tmp_path, capsys):
     assert rising[1] > 2 * rising[0] if given else rising[1] == pytest.approx(rising[0], rel=0.15)
     told = capsys.readouterr().out
     assert "95 % interval over strides" in told and f"Left out: the first {WARM_UP:g} s." in told
+
+
+def off_plate(path, side, strides, end):
+    """Lose what a plate loses that ends under the foot at `end` of each stride (S, 3) [s], or for `end` None bears only
+    0.65 of the foot."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    start = lines.index("endheader") + 2
+    names = lines[start - 1].split("\t")
+    rows = np.array([line.split("\t") for line in lines[start:]], float)
+    own = [k for k, name in enumerate(names) if name.startswith(f"ground_force_{side}_v") or f"_{side}_moment" in name]
+    for strike, _, following in strides:
+        stance = (rows[:, 0] - strike + 0.02) / (following - strike)
+        lost = (stance > (end or 0.0)) & (stance < 1.0)
+        rows[np.ix_(lost, own)] *= 0.65 if end is None else 0.0
+    text = ["\t".join(f"{value:.8g}" for value in row) for row in rows]
+    path.write_text("\n".join([*lines[:start], *text]) + "\n", encoding="utf-8")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("end", [0.48, 0.57, None], ids=["ends at 48 %", "ends at 57 %", "bears 0.65"])
+def test_planted_truth_comes_back_though_a_plate_loses_force(end, tmp_path, capsys):
+    act, settings = policy_and_settings("schedule", {"episode_seconds": 14.0})
+    recording = record(act, settings, name="schedule", episodes=1)
+    write_opensim(tmp_path, recording)
+    files = [tmp_path / "walk.mot", tmp_path / "walk.sto"]
+    strides = read_person(files).legs["left"].times
+    off_plate(files[1], "l", strides[1::3], end)
+    assert main(["person", *map(str, files), "--out", str(tmp_path / "me")]) == 0
+    curves = measure(recording).feet[0]
+    angle, moment = np.radians(curves.mean("ankle_dorsiflexion_deg")), curves.mean("ankle_moment_Nm_per_kg")
+    rows = [
+        row
+        for row in rows_of(tmp_path / "me" / "quasi_stiffness.csv")
+        if (row["joint"], row["side"]) == ("ankle", "left") and row["quasi_stiffness"]
+    ]
+    assert len(rows) == 4
+    for row in rows:
+        truth = body_of(settings).total_mass * slope_of(angle, moment, row)
+        assert float(row["quasi_stiffness"]) == pytest.approx(truth, rel=0.05)
+    told = capsys.readouterr().out
+    assert "Forces and moments of 3 left" in told and "a foot was partly off its plate" in told
+    off_plate(files[1], "l", strides, end)
+    assert main(["person", *map(str, files), "--side", "left", "--out", str(tmp_path / "none")]) == 2
+    told = capsys.readouterr().err
+    assert "no stride tells a stiffness: in each a foot was partly off its plate" in told and told.count("\n") == 1
+    assert not (tmp_path / "none").exists()
 
 
 @pytest.fixture(scope="module")
