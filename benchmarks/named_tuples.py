@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from springfoot.envs import Biped, BipedSettings
-from springfoot.envs.batch.step_kernels import EnvironmentRows, Tables, next_window
+from springfoot.envs.batch.step_kernels import Tables, next_window
 from springfoot.envs.physics.simulation import Physics
 
 CALLS = 2_000
@@ -25,12 +25,15 @@ def main() -> None:
     """Print both times for one body."""
     biped: Any = Biped(BipedSettings(), 1)
     biped.reset(np.arange(1), [0])
-    plain = biped._rows, biped._physics, biped._tables
-    named = EnvironmentRows(*plain[0]), Physics(*plain[1]), Tables(*plain[2])
-    rest = biped._springs.options, 0, np.ones(1, bool)  # the first window of a step
-    for name, arrays in (("plain", plain), ("named", named)):
-        next_window(*arrays, *rest)
-        print(f"{name} tuples: {microseconds(lambda arrays=arrays: next_window(*arrays, *rest)):.1f} µs a call")
+    plain = biped._physics, biped._tables
+    named = Physics(*biped._physics), Tables(*biped._tables)
+    first = 0  # window of a step
+    for name, (physics, tables) in (("plain", plain), ("named", named)):
+        of_forces = biped._forces, first
+        of_springs = biped._springs.options, np.ones(1, bool)
+        arguments = biped.subjects.rows, physics, *of_forces, biped._control, tables, *of_springs
+        next_window(*arguments)
+        print(f"{name} tuples: {microseconds(lambda arguments=arguments: next_window(*arguments)):.1f} µs a call")
 
 
 if __name__ == "__main__":

@@ -43,7 +43,7 @@ from ..task.pushes import Pushes
 from ..task.reward import Task
 from .exact_state import ExactState
 from .learned_person import LearnedPerson
-from .step_kernels import EnvironmentRows, Tables, begin_step, begin_window, end_step, end_window, next_window
+from .step_kernels import Tables, begin_step, begin_window, end_step, end_window, next_window
 from .step_result import StepResult, Tick, empty_outcome, stiffness_and_rest
 
 
@@ -135,9 +135,8 @@ class Biped(ExactState):
         self._nobody = np.zeros(num_envs, bool)
         self._no_reason = np.broadcast_to(0, num_envs)
         self._steps = self._task.rows["steps"]
-        forces = np.zeros((self.windows_per_step, num_envs, len(SIDES), len(CONTACTS), 2))
+        self._forces = np.zeros((self.windows_per_step, num_envs, len(SIDES), len(CONTACTS), 2))
         self._control = np.zeros((num_envs, len(SIDES), len(JOINTS), 2))
-        self._rows = tuple(EnvironmentRows(self.subjects.rows, self._task.rows, forces, self._control))
         self._tables = self._kernel_tables()
         self._physics = tuple(self._simulation.arrays)
         self._kept = {"control": self.subjects.rows, "task": self._task.rows} | self._simulation.kept
@@ -279,15 +278,13 @@ class Biped(ExactState):
             self._tables = self._kernel_tables()
 
     def _kernel_tables(self) -> tuple[Any, ...]:
-        """Return the curves over the stride for the kernels: `Tables`, as a plain tuple."""
+        """Return the curves over the stride for the kernels of a window: `Tables`, as a plain tuple."""
         return tuple(
             Tables(
                 rest=self._springs.rest.table,
-                schedule=self._springs.schedule.table,
                 legs=self._legs.table.table,
                 incline=self._incline,
                 feet=self._springs.feet,
-                target=self._task.table,
             )
         )
 
@@ -364,9 +361,17 @@ class Biped(ExactState):
             self._simulation.push(self._pushes.force(self._steps, self._random, step.running))
         if step.of_person is not None or self._learned is not None:
             self._move_person(step, 0)
-        options = self._springs.options
-        bodies = self._simulation.arrays.bodies
-        begin_step(self._rows, bodies, self._tables, options, step.factor, step.walking, step.on_schedule)
+        begin_step(
+            self.subjects.rows,
+            self._simulation.arrays.bodies,
+            self._control,
+            self._tables,
+            self._springs.schedule.table,
+            self._springs.options,
+            step.factor,
+            step.walking,
+            step.on_schedule,
+        )
 
     def _move_person(self, step: "_Step", window: int) -> None:
         """Move the rest angles of hips, knees and ankles before control window number `window` of the step: by the
@@ -396,17 +401,21 @@ class Biped(ExactState):
 
     def _next_window(self, step: "_Step", window: int) -> None:
         """End control window number `window` of the step and begin the next."""
+        controls = self.subjects.rows
         options = self._springs.options
         person_acts = self._learned is not None and (window + 1) % WINDOWS_PER_STEP == 0  # in steps of 40 ms
         if step.window_start is None and not person_acts:
-            next_window(self._rows, self._physics, self._tables, options, window, step.walking)
+            next_window(
+                controls, self._physics, self._forces, window, self._control, self._tables, options, step.walking
+            )
             self._after_window(step)
         else:  # report the window with the control that produced it
-            end_window(self._rows, self._physics, window, step.walking)
+            end_window(controls, self._physics, self._forces, window, step.walking)
             self._after_window(step)
             if person_acts:
                 self._move_person(step, window + 1)
-            begin_window(self._rows, self._simulation.arrays.bodies, self._tables, options, step.walking)
+            bodies = self._simulation.arrays.bodies
+            begin_window(controls, bodies, self._control, self._tables, options, step.walking)
 
     def _after_window(self, step: "_Step") -> None:
         """Lay the ground of the next footfalls, and report the window to a listener."""
@@ -427,9 +436,17 @@ class Biped(ExactState):
     def _judge(self, step: "_Step") -> StepResult:
         """End the last window of the step, and return its result: reward, observation, termination."""
         outcome = empty_outcome(self.num_envs, len(self.observation_names))
-        to_fill = tuple(outcome)
-        task = self._task.options
-        terminated = end_step(self._rows, self._physics, self._tables, task, step.walking, step.running, to_fill)
+        terminated = end_step(
+            self.subjects.rows,
+            self._task.rows,
+            self._physics,
+            self._forces,
+            self._task.table,
+            self._task.options,
+            step.walking,
+            step.running,
+            tuple(outcome),
+        )
         self._after_window(step)
         if self.settings.sensor_noise:
             running = np.flatnonzero(step.running)

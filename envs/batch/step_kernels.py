@@ -6,8 +6,9 @@
 next; `end_step` measures, judges and observes. Each part stands in the file of its idea. For a listener to each window,
 `end_window` and `begin_window` are two calls.
 
-Arrays travel as plain tuples and get their names inside: numba looks up a plain tuple's type in C, a named one's in
-Python, which costs more than the kernels of one body (`python -m benchmarks.named_tuples`).
+A call takes the arrays that it reads and no others: numba looks up the type of each at every call, which for one body
+costs more than the kernel itself. Those of `Tables`, `Physics` and `Outcome` travel as plain tuples and get their names
+inside: numba looks up a plain tuple's type in C, a named one's in Python (`python -m benchmarks.named_tuples`).
 
 Axes: N environments; W control windows of a step; a `PhaseTable` (R, SAMPLES, 2, C) has R rows, one for each body,
 variant of the leg constants and tabulated speed, SAMPLES phases, value and rise to the next phase, and C curves.
@@ -31,68 +32,50 @@ from ..task.reward import ALIVE, judge, remember, total
 from .step_result import Outcome, report
 
 
-class EnvironmentRows(NamedTuple):
-    """Arrays with the state of each environment."""
-
-    controls: NDArray
-    """(N,) of `CONTROL_ROW`."""
-    tasks: NDArray
-    """(N,) of `TASK_ROW`."""
-    forces: NDArray
-    """(W, N, side, contact, 2) contact forces in the step's W windows [N]."""
-    control: NDArray
-    """(N, side, joint, 2) K [N m/rad] and K theta_eq [N m] of the present window, for the simulation."""
-
-
 class Tables(NamedTuple):
-    """The curves over the stride, each of a `PhaseTable`."""
+    """The curves over the stride that a control window begins with, each of a `PhaseTable`."""
 
     rest: NDArray
     """(R, SAMPLES, 2, 2 or 4) rest angles of ankle and toe [rad], and torques beside the springs [N m]."""
-    schedule: NDArray
-    """(R, SAMPLES, 2, 2) the schedule's stiffness of ankle and toe [N m/rad]."""
     legs: NDArray
     """(R, SAMPLES, 2, 7) of `leg_curves`."""
     incline: NDArray
     """(1, SAMPLES, 2, 4) of `slope_table`."""
     feet: tuple[NDArray, ...]
     """`FootLines`."""
-    target: NDArray
-    """(R, SAMPLES, 2, C) of `TARGET`."""
 
 
 @kernel
-def begin_window(rows, bodies, tables, springs, walking) -> None:
+def begin_window(controls, bodies, control, tables, springs, walking) -> None:
     """Begin a control window: put stiffness and rest angles of all joints into the control; arguments as of
     `begin_step`."""
-    rows = EnvironmentRows(*rows)
     tables = Tables(*tables)
     # Ankles and toes, then hips and knees.
-    move(rows.controls, bodies, rows.control, tables.rest, tables.incline, tables.feet, springs, walking)
-    drive(rows.controls, bodies, rows.control, tables.legs, tables.incline)
+    move(controls, bodies, control, tables.rest, tables.incline, tables.feet, springs, walking)
+    drive(controls, bodies, control, tables.legs, tables.incline)
 
 
 @kernel
-def end_window(rows, physics, window, walking) -> None:
+def end_window(controls, physics, forces, window, walking) -> None:
     """End control window number `window` of the step: measure it, advance the phase, and keep its contact forces.
 
     Args:
-        rows: `EnvironmentRows`, as a plain tuple.
+        controls: (N,) of `CONTROL_ROW`.
         physics: `Physics` of the simulation, as a plain tuple.
+        forces: (W, N, side, contact, 2) contact forces in the step's W windows [N].
         window: number of the control window in the step, from 0.
         walking: (N,) bool, environments whose phase moves: bodies that neither stand nor have ended.
     """
-    rows = EnvironmentRows(*rows)
     physics = Physics(*physics)
     bodies = physics.bodies
     measure_bodies(bodies, physics.state, physics.sensors, physics.velocity, physics.warnings)
-    advance(rows.controls, bodies, walking)
+    advance(controls, bodies, walking)
     for i in range(len(bodies)):
         force = bodies[i].measured.force
         for side in range(2):
             for contact in range(3):
                 for axis in range(2):
-                    rows.forces[window, i, side, contact, axis] = force[side, contact, axis]
+                    forces[window, i, side, contact, axis] = force[side, contact, axis]
 
 
 @part
@@ -100,7 +83,7 @@ def _average_forces(tasks, forces, running) -> None:
     """Set `force` of environments `running` (N,) to the mean of their contact forces in the step, which the observation
     shows and with which the next step's `impact` compares.
 
-    `tasks` is (N,) of `TASK_ROW`, `forces` as in `EnvironmentRows`.
+    `tasks` is (N,) of `TASK_ROW`, `forces` as of `end_window`.
     """
     for i in range(len(tasks)):
         if not running[i]:
@@ -115,44 +98,39 @@ def _average_forces(tasks, forces, running) -> None:
 
 
 @kernel
-def begin_step(rows, bodies, tables, springs, factor, walking, on_schedule) -> None:
+def begin_step(controls, bodies, control, tables, schedule, springs, factor, walking, on_schedule) -> None:
     """Set the stiffness and begin the first control window.
 
     Args:
-        rows: `EnvironmentRows`, as a plain tuple.
+        controls: (N,) of `CONTROL_ROW`.
         bodies: (N,) of `BODY_ROW`, as measured now.
+        control: (N, side, joint, 2) K [N m/rad] and K theta_eq [N m] of the window, for the simulation; filled.
         tables: `Tables`, as a plain tuple.
+        schedule: (R, SAMPLES, 2, 2) the schedule's stiffness of ankle and toe [N m/rad], of a `PhaseTable`.
         springs: (N,) of `SPRING_OPTIONS`.
         factor: (N, 4) factors of the actions on the stiffness [-].
         walking: (N,) bool, environments with moving springs and phase.
         on_schedule: (N,) bool, walking environments that take the schedule's stiffness in place of the action's.
     """
-    stiffen(
-        EnvironmentRows(*rows).controls,
-        bodies,
-        Tables(*tables).schedule,
-        springs,
-        factor,
-        walking,
-        on_schedule,
-    )
-    begin_window(rows, bodies, tables, springs, walking)
+    stiffen(controls, bodies, schedule, springs, factor, walking, on_schedule)
+    begin_window(controls, bodies, control, tables, springs, walking)
 
 
 @kernel
-def next_window(rows, physics, tables, springs, window, walking) -> None:
+def next_window(controls, physics, forces, window, control, tables, springs, walking) -> None:
     """End window number `window` and begin the next; arguments as of `end_window` and `begin_step`."""
-    end_window(rows, physics, window, walking)
-    begin_window(rows, Physics(*physics).bodies, tables, springs, walking)
+    end_window(controls, physics, forces, window, walking)
+    begin_window(controls, Physics(*physics).bodies, control, tables, springs, walking)
 
 
 @kernel
-def end_step(rows, physics, tables, task, walking, running, outcome) -> bool:
+def end_step(controls, tasks, physics, forces, target, task, walking, running, outcome) -> bool:
     """End the last control window, judge the step and observe.
 
     Args:
-        rows, tables: as of `begin_step`.
-        physics: as of `end_window`.
+        controls, physics, forces: as of `end_window`.
+        tasks: (N,) of `TASK_ROW`.
+        target: (R, SAMPLES, 2, C) of `TARGET`, of a `PhaseTable`.
         task: (1,) of `TASK_OPTIONS`.
         walking: (N,) bool, environments with moving phase.
         running: (N,) bool, environments that took the step; the others get no reward.
@@ -160,11 +138,9 @@ def end_step(rows, physics, tables, task, walking, running, outcome) -> bool:
 
     Returns whether an episode is terminated.
     """
-    controls, tasks, forces, _ = rows
     bodies = Physics(*physics).bodies
-    target = Tables(*tables).target
     outcome = Outcome(*outcome)
-    end_window(rows, physics, len(forces) - 1, walking)
+    end_window(controls, physics, forces, len(forces) - 1, walking)
     terms = np.empty((len(running), len(task[0].weights)))
     judge(tasks, controls, bodies, target, task, forces, terms)
     total(terms, task, outcome.reward)
