@@ -311,7 +311,7 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
         action = real_numbers("action", action)
         if action.shape != self.action_space.shape:
             raise SpringfootError(f"action must have shape {self.action_space.shape}, got {action.shape}")
-        result = self.biped.step(action[None])
+        result = self.biped.step_checked(action[None])
         terminated = bool(result.terminated[0])
         truncated = bool(result.truncated[0])
         self._over = terminated or truncated

@@ -312,7 +312,15 @@ class Biped(ExactState):
         Environments where the mask `active` (N,) is False stay as they are; their reward is 0.
         Raises `SpringfootError` for actions of another shape, and for NaN or infinity.
         """
-        step = self._decode(actions, active)
+        action = real_numbers("actions", actions)
+        if action.shape != (self.num_envs, len(self.action_names)):
+            expected = self.num_envs, len(self.action_names)
+            raise SpringfootError(f"actions must have shape {expected}, got {action.shape}")
+        return self.step_checked(action, active)
+
+    def step_checked(self, action: NDArray, active: NDArray | None = None) -> StepResult:
+        """Step as `step` does, with an `action` that is known to be float64 (N, A), in C order."""
+        step = self._decode(action, active)
         self._before_step(step)
         for window in range(self.windows_per_step - 1):
             self._simulate(step)
@@ -320,19 +328,15 @@ class Biped(ExactState):
         self._simulate(step)
         return self._judge(step)
 
-    def _decode(self, actions: NDArray, active: NDArray | None) -> "_Step":
+    def _decode(self, action: NDArray, active: NDArray | None) -> "_Step":
         """Return the step that is to be taken: the environments that run, and the factors of their actions on the
-        stiffness. Raises `SpringfootError` for bad actions, as `step`.
+        stiffness. Raises `SpringfootError` for NaN or infinity.
         """
         running = self._everyone
         ids = None
         if active is not None and not active.all():
             running = active
             ids = np.flatnonzero(active)
-        action = real_numbers("actions", actions)
-        if action.shape != (self.num_envs, len(self.action_names)):
-            expected = self.num_envs, len(self.action_names)
-            raise SpringfootError(f"actions must have shape {expected}, got {action.shape}")
         of_stiffness, of_person = action, None
         if self._acts_as_person:  # behind the actions on the stiffness, if any
             of_person = action[:, -len(PERSON_ACTIONS) :]

@@ -32,7 +32,14 @@ MOST_PUSH = 1e5
 """Hardest push [N]; chosen."""
 SHORTEST_PUSH_INTERVAL = 0.01
 """Shortest interval of pushes [s]: a control window, in which the force is held."""
-_NO_NUMBERS = {"S": "bytes", "U": "text", "M": "dates", "m": "spans of time", "c": "complex numbers"}
+_NO_NUMBERS = {
+    "S": "bytes",
+    "U": "text",
+    "M": "dates",
+    "m": "spans of time",
+    "c": "complex numbers",
+    "V": "records",
+}
 """NumPy's kinds of arrays that are no real numbers, and their names for errors."""
 MOST_ENVIRONMENTS = 1_000_000
 """Largest batch; chosen."""
@@ -172,9 +179,10 @@ def real_numbers(name: str, value: Any) -> NDArray:
     """
     try:
         array = np.asarray(value)
-        if array.dtype.kind in _NO_NUMBERS or array.dtype.names is not None:
-            raise SpringfootError(f"{name} must be real numbers, got {_NO_NUMBERS.get(array.dtype.kind, 'records')}")
-        if array.dtype == object and any(isinstance(item, (str, bytes, complex)) for item in array.flat):
+        kind = array.dtype.kind
+        if kind in _NO_NUMBERS:
+            raise SpringfootError(f"{name} must be real numbers, got {_NO_NUMBERS[kind]}")
+        if kind == "O" and any(isinstance(item, (str, bytes, complex)) for item in array.flat):
             raise TypeError  # NumPy would read numbers out of text
         return np.array(array, float, order="C")
     except (TypeError, OverflowError):  # OverflowError: an integer too large for a float
