@@ -423,7 +423,8 @@ class Biped(ExactState):
 
     def _after_window(self, step: "_Step") -> None:
         """Lay the ground of the next footfalls, and report the window to a listener."""
-        self._ground.advance(self._simulation.now, self._legs.phase, self._random)
+        if self.settings.unevenness_m:
+            self._ground.advance(self._simulation.now, self._legs.phase, self._random)
         if self.on_tick is not None and step.window_start is not None:
             bodies = self._simulation.arrays.bodies
             self.on_tick(
@@ -440,7 +441,8 @@ class Biped(ExactState):
     def _judge(self, step: "_Step") -> StepResult:
         """End the last window of the step, and return its result: reward, observation, termination."""
         outcome = empty_outcome(self.num_envs, len(self.observation_names))
-        terminated = end_step(
+        observation, reward, terminated, truncated, values = outcome
+        any_terminated = end_step(
             self.subjects.rows,
             self._task.rows,
             self._physics,
@@ -449,22 +451,21 @@ class Biped(ExactState):
             self._task.options,
             step.walking,
             step.running,
-            tuple(outcome),
+            outcome,
         )
         self._after_window(step)
         if self.settings.sensor_noise:
             running = np.flatnonzero(step.running)
             self._noise.draw(running, [self._random[index] for index in running])
         reasons = self._no_reason
-        if terminated:
-            min_hip_height = self._task.rows["scales"]["min_hip_height"]
-            reasons = reasons_of(self._simulation.now, min_hip_height, outcome.terminated)
+        if any_terminated:
+            reasons = reasons_of(self._simulation.now, self._task.rows["scales"]["min_hip_height"], terminated)
         return StepResult(
-            observation=self._noise.on(outcome.observation),
-            reward=outcome.reward,
-            terminated=outcome.terminated,
-            truncated=outcome.truncated,
-            values=outcome.values,
+            observation=self._noise.on(observation),
+            reward=reward,
+            terminated=terminated,
+            truncated=truncated,
+            values=values,
             termination=reasons,
         )
 

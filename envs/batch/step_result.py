@@ -158,15 +158,15 @@ class Outcome(NamedTuple):
     values: NDArray
 
 
-def empty_outcome(num: int, entries: int) -> Outcome:
-    """Return arrays for the outcome of a step of `num` environments with so many entries of the observation, not yet
-    filled."""
-    return Outcome(
-        observation=np.empty((num, entries), np.float32),
-        reward=np.empty(num),
-        terminated=np.empty(num, bool),
-        truncated=np.empty(num, bool),
-        values=np.empty((num, len(INFO))),
+def empty_outcome(num: int, entries: int) -> tuple[NDArray, NDArray, NDArray, NDArray, NDArray]:
+    """Return the arrays of an `Outcome`, as a plain tuple, for a step of `num` environments with so many entries of the
+    observation; they are not yet filled."""
+    return (
+        np.empty((num, entries), np.float32),  # observation
+        np.empty(num),  # reward
+        np.empty(num, bool),  # terminated
+        np.empty(num, bool),  # truncated
+        np.empty((num, len(INFO))),  # values
     )
 
 

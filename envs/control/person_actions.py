@@ -81,7 +81,7 @@ class PersonActions:
 
         Args:
             factor: (N, 4) factors of the actions on the stiffness [-], changed in place.
-            ranges: (4,) factor at action 1 where no schedule sets the stiffness.
+            ranges: (1, 4) factor at action 1 where no schedule sets the stiffness.
             running: (N,) bodies that take the step; a stiffness drawn anew is drawn for them.
             randoms: (N,) their generators.
         """

@@ -351,8 +351,9 @@ class FootSprings:
         """`FootLines`, as a plain tuple for kernels."""
         self._residual = settings.action_mode == "residual"
         _, factor = _log_scale(settings, subjects.bodies[0])
-        self.factor_at_one = np.tile(factor, 2)
-        """(4,) factor of an action of 1 on the stiffness at action 0, where no schedule sets it [-]."""
+        self.factor_at_one = np.tile(factor, (1, 2))
+        """(1, 4) factor of an action of 1 on the stiffness at action 0, where no schedule sets it [-]; of as many
+        dimensions as the actions, without which NumPy's power of one body's takes twice as long."""
         self.options = np.zeros(num, SPRING_OPTIONS)
         """(N,) of `SPRING_OPTIONS`."""
         scheduled = [self._residual or settings.stiffness_joints not in ("both", joint) for joint in ("ankle", "toe")]

@@ -198,7 +198,7 @@ class Simulation:
             watched: whether to fill `work` for this window, with 0 for simulations not in `ids`; else it keeps its last
                 values. The motion has the same bits either way.
         """
-        self._control[:] = control
+        self._control[...] = control
         if watched:
             self._roll_watched(ids)
         else:

@@ -51,8 +51,6 @@ class Ground:
         The new ground stays below the foot. `m` and `leg_phase` (N, side) are measurement and stride phases after the
         window, `randoms` the generators of the environments.
         """
-        if self._settings.unevenness_m == 0.0:
-            return
         arrived = (self._phase < NEXT_FOOTFALL_PHASE) & (leg_phase >= NEXT_FOOTFALL_PHASE)
         self._phase[:] = leg_phase
         for index, side in np.argwhere(arrived).tolist():
