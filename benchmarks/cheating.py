@@ -25,6 +25,7 @@ from springfoot.agents.training.config import PRESETS
 from springfoot.agents.training.training import train
 from springfoot.envs import Biped
 from springfoot.envs.batch.step_result import Tick
+from springfoot.envs.batch.walk import walked_steps
 from springfoot.envs.physics.model import JOINTS, SIDES
 from springfoot.envs.physics.muscles import leg_strengths
 from springfoot.envs.physics.timing import PHYSICS_STEP, PHYSICS_STEPS_PER_WINDOW
@@ -80,13 +81,8 @@ def replayed(biped: Biped, act: PolicyFunction, windows: int) -> tuple[NDArray, 
         controls.append(biped.data(0).ctrl.copy())
 
     biped.on_tick = keep
-    observation = biped.observe()
-    for _ in range(windows // biped.windows_per_step):
-        step = biped.step(act(observation))
-        observation = step.observation
+    for _, step in walked_steps(biped, act, windows // biped.windows_per_step):
         paid.append([step.info[f"reward/{term}"][0] for term in ("fibre_work", "effort")])
-        if step.terminated[0]:
-            break
     torque: list[NDArray] = []
     angle = [replay.qpos[3:].copy()]
     for control in controls:

@@ -176,8 +176,8 @@ def _swings(row, force, side):
 def muscle_stiffness(springs, side, joint) -> float:
     """Return the acting K of the muscles at one joint [N m/rad], 0 while they are slack or a device replaces them.
 
-    `springs` is of `SPRING_STATE`. The reward charges this K alone; the control and `info` hold the muscles' and the
-    device's together.
+    `springs` is of `SPRING_STATE`. The reward charges this K alone, of an ankle behind a tendon that of its muscle; the
+    control and `info` hold the muscles' and the device's together.
     """
     return springs.taut[side, joint] * springs.stiffness[side, joint]
 

@@ -1,8 +1,9 @@
 """Describe one foot, sound or prosthetic, as physics: muscles or a device's springs at ankle and toe, an orthosis,
 segments of other mass.
 
-Angles are those of the joints (dorsiflexion, toe-up positive). Numbers of a device, or an orthosis, are the same on
-every body: they do not scale.
+The law of the springs' torque is in `model`, the stiffness over the stride and its bound by a tendon in
+`..control.stiffness_control`. Angles are those of the joints (dorsiflexion, toe-up positive). Numbers of a device, or
+an orthosis, are the same on every body: they do not scale.
 """
 
 from dataclasses import dataclass

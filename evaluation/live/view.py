@@ -210,7 +210,7 @@ class LiveView:
     def _fit_inputs_to_feet(self, wishes: dict[str, Any]) -> None:
         """Show the inputs that do something on the present feet, and hide the others.
 
-        With another kind among the `wishes` that have just been granted, the numbers of that foot begin anew.
+        If the `wishes` just granted change the kind of a foot, its inputs show the numbers of the new kind.
         """
         present = self._session.wishes
         for setting in FOOT_SETTINGS:

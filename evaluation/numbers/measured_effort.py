@@ -28,6 +28,7 @@ from springfoot.gait.plan.effort import (
 )
 
 from ..recording.recording import TICK, Recording
+from .series import distance_walked
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -76,7 +77,7 @@ def episode_effort(
     inner = slice(first + 1, last - 1)  # the ticks that `use` is of
     return EpisodeEffort(
         seconds=(inner.stop - inner.start) * TICK,
-        distance=float(series["com"][inner.stop - 1, 0] - series["com"][inner.start - 1, 0]),
+        distance=distance_walked(series["com"], inner.start, inner.stop),
         use=use,
         net_energy=metabolic_energy(series["joint_work"][inner]).sum((0, -1)),
         acceleration=mean_squared_acceleration(series["velocity"][inner.start - 1 : inner.stop], TICK),

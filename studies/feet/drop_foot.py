@@ -24,7 +24,7 @@ from springfoot.files.markdown import MISSING, table
 
 from ..base.intervals import share_interval
 from ..base.study import Answer, OnProgress, WalkingStudy
-from .foot_numbers import numbers_of
+from .foot_numbers import numbers_of_feet
 from .spring_map import with_walked_speed
 from .walked_speeds import Row, rows_csv
 
@@ -93,7 +93,7 @@ class DropFoot(WalkingStudy):
                 given = {"speed": speed, "push_newton": push, "episode_seconds": self.seconds}
                 acting, settings = policy_and_settings(policy, given)
                 recordings = record_feet(acting, settings, feet, name=policy, progress=progress, **self.how)
-                of_pushes.append([numbers_of(measure(recording)) for recording in recordings])
+                of_pushes.append([numbers_of_feet(measure(recording)) for recording in recordings])
             for (stiffness, rest), undisturbed, pushed in zip(springs, *of_pushes, strict=True):
                 row = {"policy": policy, "speed_m_s": speed, "spring_Nm_rad": stiffness, "rest_deg": rest}
                 row |= with_walked_speed(undisturbed)

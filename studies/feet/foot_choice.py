@@ -32,7 +32,7 @@ from springfoot.files.markdown import MISSING, table, text_of
 from ..base.flags import read_foot_flag
 from ..base.study import Answer, OnProgress, WalkingStudy
 from .adapting_persons import person_and_settings
-from .foot_numbers import numbers_of
+from .foot_numbers import numbers_of_feet
 from .orthosis import braced_calf
 from .told_apart import GAP, TOLERANCE, common_speed, difference, price_at, verdict
 from .walked_speeds import TWO_PRICES, Row, rows_csv
@@ -178,7 +178,7 @@ class FootChoice(WalkingStudy):
         for person, *own in zip(self.persons, walks, slower, pushed, strict=True):
             for name, walk, other_walk, pushed_walk in zip(names, *own, strict=True):
                 falls = {"falls_other_speed": other_walk.falls, "falls_pushed": pushed_walk.falls}
-                rows.append({"person": person, "foot": name, **numbers_of(walk.gait, self.side), **falls})
+                rows.append({"person": person, "foot": name, **numbers_of_feet(walk.gait, self.side), **falls})
         pairs = [[[of[index] for of in at] for at in (walks, slower)] for index in range(len(names))]
         walked = [_walked_speeds(pair) for pair in pairs]
         speed = common_speed(self.speed, walked)

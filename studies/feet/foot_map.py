@@ -28,7 +28,7 @@ from springfoot.files.markdown import MISSING, table, text_of
 
 from ..base.study import Answer, OnProgress, WalkingStudy
 from .adapting_persons import person_and_settings
-from .foot_numbers import numbers_of
+from .foot_numbers import numbers_of_feet
 from .walked_speeds import Row, rows_csv
 
 RightFoot = str | dict[str, Any]
@@ -118,7 +118,7 @@ class FootMap(WalkingStudy):
                 given = {} if isinstance(foot, str) else foot
                 numbers = {key: given.get(key) for key in ("ankle_stiffness", "ankle_deg", "toe_stiffness")}
                 row = {"person": person, "told": told, "foot": name, **numbers, "episodes": self.episodes}
-                rows.append(row | numbers_of(measure(recording)))
+                rows.append(row | numbers_of_feet(measure(recording)))
         return rows
 
     def _flat_rows(self, person: str, progress: OnProgress) -> list[dict[str, Any]]:
@@ -130,7 +130,7 @@ class FootMap(WalkingStudy):
             act, settings = policy_and_settings(name, given)
             gait = measure(record(act, settings, name=name, progress=progress, **self.how))
             row = {"person": person, "ankle_N_m_rad": stiffness, "episodes": self.episodes}
-            rows.append(row | numbers_of(gait))
+            rows.append(row | numbers_of_feet(gait))
         return rows
 
 

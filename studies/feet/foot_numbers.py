@@ -13,7 +13,7 @@ FOOT_NUMBERS = (
 again."""
 
 
-def numbers_of(gait: Gait, examined_side: str = "right") -> dict[str, float | None]:
+def numbers_of_feet(gait: Gait, examined_side: str = "right") -> dict[str, float | None]:
     """Return the numbers of an undisturbed walk, by `FOOT_NUMBERS`; None for numbers without a stride.
 
     The foot of `examined_side` is examined, the other one is sound. Where both feet are alike, "both", it is the right

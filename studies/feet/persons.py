@@ -20,7 +20,7 @@ from springfoot.envs import Biped, BipedSettings
 from springfoot.envs.physics import Feet
 from springfoot.errors import SpringfootError, require_count
 from springfoot.evaluation.numbers import mean_speed, measure
-from springfoot.evaluation.recording import TICK, Episodes, policy_and_settings, record, record_walk
+from springfoot.evaluation.recording import TICK, WARM_UP, Episodes, policy_and_settings, record, record_walk
 from springfoot.files.markdown import MISSING, table, text_of
 from springfoot.files.writing import csv_text
 
@@ -31,8 +31,6 @@ SOUND_SPEEDS = (0.9, 1.0, 1.2, 1.4, 1.5)
 """Commanded speeds on sound feet [m/s]."""
 FIRST_SEED = 50_000_000
 """Seed of the first drawn episode; trainings use others."""
-SETTLED_SECONDS = 3.0
-"""Time after which the speed counts [s]; chosen, two strides or more."""
 PUSH_NEWTON = 100.0
 """Size of the pushes [N]."""
 SLOPES_DEG = (-5.0, 5.0)
@@ -52,7 +50,7 @@ class DrawnEpisode:
     speed: float
     """Commanded speed [m/s]."""
     walked: float
-    """Mean speed of the CoM after `SETTLED_SECONDS` [m/s]; NaN if it fell before."""
+    """Mean speed of the CoM after `WARM_UP` [m/s]; NaN if it fell before."""
     fell: bool
 
 
@@ -92,9 +90,9 @@ def walk_drawn(
 
 
 def _settled_speed(com: NDArray) -> float:
-    """Return the CoM's mean forward speed after `SETTLED_SECONDS` [m/s], from its positions (T, (x, z)) [m] at each
+    """Return the CoM's mean forward speed after `WARM_UP` [m/s], from its positions (T, (x, z)) [m] at each
     `TICK`; NaN for a shorter walk."""
-    settled = round(SETTLED_SECONDS / TICK)
+    settled = round(WARM_UP / TICK)
     return mean_speed(com, settled, len(com)) if len(com) > settled else np.nan
 
 

@@ -22,7 +22,7 @@ from springfoot.files.markdown import MISSING, table
 
 from ..base.kept import Kept
 from ..base.study import Answer, OnProgress, PersonsStudy
-from .foot_numbers import FOOT_NUMBERS, numbers_of
+from .foot_numbers import FOOT_NUMBERS, numbers_of_feet
 from .walked_speeds import ASKED_SPEEDS, TWO_PRICES, WALKED_SPEEDS, Row, at_walked_speeds, lowest, rows_csv
 
 COLORS = ("#0b6e8f", "#c26a1b", "#7a5195", "#4a8f3c", "#555555")
@@ -105,7 +105,7 @@ class SpringMap(PersonsStudy):
             """Walk on all feet, and return their numbers under the key `walks`."""
             acting, settings = policy_and_settings(policy, {**given, "episode_seconds": self.seconds})
             recordings = record_feet(acting, settings, feet, name=policy, progress=progress, **self.how)
-            return {"walks": [numbers_of(measure(recording)) for recording in recordings]}
+            return {"walks": [numbers_of_feet(measure(recording)) for recording in recordings]}
 
         how = {**self.how, "threads": 0, "policy": policy, "seconds": self.seconds}
         return kept.get([how, given, list(feet), FOOT_NUMBERS], make)["walks"]

@@ -22,7 +22,7 @@ from springfoot.files.provenance import versions_and_commit
 from ..base.study import Answer, OnProgress, WalkingStudy, without_places
 from .adapting_persons import person_and_settings
 from .foot_choice import MOST_FEET, SIDES_OF, named_feet
-from .foot_numbers import FOOT_NUMBERS, numbers_of
+from .foot_numbers import FOOT_NUMBERS, numbers_of_feet
 from .orthosis import braced_calf
 from .walked_speeds import rows_csv
 
@@ -113,7 +113,9 @@ class Walks(WalkingStudy):
             recordings = record_feet(act, settings, feet, name=person, progress=progress, **self.how)
             walks.extend(map(walk_of, recordings))
         side = self.side if self.foot else "right"
-        numbers = [dict.fromkeys(FOOT_NUMBERS) if walk.gait is None else numbers_of(walk.gait, side) for walk in walks]
+        numbers = [
+            dict.fromkeys(FOOT_NUMBERS) if walk.gait is None else numbers_of_feet(walk.gait, side) for walk in walks
+        ]
         # (masses, speeds, feet) number of episodes that fell.
         falls = np.array([(walk.recording.fall_reason != "").sum() for walk in walks])
         rows = [

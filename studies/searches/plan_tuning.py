@@ -45,7 +45,7 @@ from springfoot.gait.plan import (
 from ..base.study import Answer, OnProgress, Study
 from .cma_search import asked_of, generations
 from .constants_file import read_styles
-from .prediction_table import numbers_of, prediction_table
+from .prediction_table import prediction_numbers, prediction_table
 
 CHOICES: dict[str, tuple[float, float, float, float]] = {
     "double_support": (0.2, 0.05, 0.06, 0.4),  # of the step time
@@ -247,7 +247,10 @@ class PlanTuning(Study):
             parts.append(f"{speed:g} m/s: paid {cost:.4f}: {effort}")
             if plan is not None:
                 human = human_gait(speed)
-                columns = {"people": numbers_of(human, human), "the plan": numbers_of(gait_of(plan), human)}
+                columns = {
+                    "people": prediction_numbers(human, human),
+                    "the plan": prediction_numbers(gait_of(plan), human),
+                }
                 parts.append(prediction_table(columns, ("the plan",)))
         return Answer(
             text="\n\n".join(parts), files={"generations.csv": csv_text(["generation", "best", "median"], lines)}

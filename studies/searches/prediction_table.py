@@ -63,13 +63,13 @@ def walk_numbers(metrics: Mapping[str, Any]) -> dict[str, Any]:
 
 def plan_numbers(settings: BipedSettings) -> dict[str, Any]:
     """Return the numbers of `PREDICTION` for the plan of `settings`, from its inverse dynamics."""
-    return numbers_of(reference_walk_at(settings, settings.speed).target, reference_gait(settings))
+    return prediction_numbers(reference_walk_at(settings, settings.speed).target, reference_gait(settings))
 
 
 def people_numbers(settings: BipedSettings) -> dict[str, Any]:
     """Return the numbers of `PREDICTION` for people's mean curves."""
     human = reference_gait(settings)
-    return numbers_of(human, human)
+    return prediction_numbers(human, human)
 
 
 def prediction_table(columns: Mapping[str, Mapping[str, Any]], judged: Sequence[str]) -> str:
@@ -118,7 +118,7 @@ def _positive_work(gait: HumanGait) -> float:
     return 2 * float(stride_work(power, np.full(3, gait.stride_time))[0].sum()) / GRAVITY
 
 
-def numbers_of(gait: HumanGait, human: HumanGait) -> dict[str, Any]:
+def prediction_numbers(gait: HumanGait, human: HumanGait) -> dict[str, Any]:
     """Return the numbers of `PREDICTION` but falls and speed, for the mean curves of `gait` against those of `human`.
 
     They are nested as metrics of a walk are. `human` is people's gait.

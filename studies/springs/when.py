@@ -200,7 +200,7 @@ class When(WalkingStudy):
         pushed = Condition(push_newton=self.pushes[0])
         costs = []
         for walked in self._walk(of_class, vectors, seed, starts, pushed, progress):
-            numbers = numbers_of(walked)
+            numbers = aim_numbers(walked)
             if numbers[aim] is None:
                 costs.append(NO_WALK)
             else:
@@ -211,13 +211,13 @@ class When(WalkingStudy):
     def _test_numbers(
         self, kept: Kept, of_class: StiffnessClass, vector: NDArray, condition: Condition, progress: OnProgress
     ) -> dict[str, Any]:
-        """Return `fell` and the numbers of `numbers_of` as lists over the test's episodes under a condition; they come
+        """Return `fell` and the numbers of `aim_numbers` as lists over the test's episodes under a condition; they come
         from `kept` if it has them."""
 
         def make() -> dict[str, Any]:
             """Walk the test's episodes; return their lists."""
             (walked,) = self._walk(of_class, [vector], self.seed + TEST_SEED, self.episodes, condition, progress)
-            rows = [numbers_of(walked.of_episode(index)) for index in range(self.episodes)]
+            rows = [aim_numbers(walked.of_episode(index)) for index in range(self.episodes)]
             return {
                 "fell": (walked.fall_reason != "").tolist(),
                 **{name: [row[name] for row in rows] for name in rows[0]},
@@ -304,7 +304,7 @@ def _batch(person: str, seconds: float, condition: Condition, count: int, thread
     return Biped(settings, count, threads)
 
 
-def numbers_of(recording: Recording) -> dict[str, Any]:
+def aim_numbers(recording: Recording) -> dict[str, Any]:
     """Return speed and the number of each `Aim` of a recording, from its metrics; None of all if one is missing."""
     metrics = measure(recording).metrics
     angles = [metrics["joints"][joint]["rmse_deg"] for joint in COMPARED_JOINTS]

@@ -6,7 +6,7 @@ from springfoot.evaluation.numbers.metrics import measure
 from springfoot.evaluation.numbers.per_leg import leg_numbers
 from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.evaluation.recording.recording import record, record_feet
-from springfoot.studies.feet.foot_numbers import FOOT_NUMBERS, numbers_of
+from springfoot.studies.feet.foot_numbers import FOOT_NUMBERS, numbers_of_feet
 
 SHORT = {"episode_seconds": 6.0}
 
@@ -14,7 +14,7 @@ SHORT = {"episode_seconds": 6.0}
 def test_numbers_are_those_of_the_evaluation():
     acting, settings = policy_and_settings("pretrained", {**SHORT, "right_foot": "passive"})
     gait = measure(record(acting, settings, name="pretrained", episodes=2))
-    own, legs = numbers_of(gait), gait.metrics["per_leg"]
+    own, legs = numbers_of_feet(gait), gait.metrics["per_leg"]
     assert set(own) == set(FOOT_NUMBERS)
     assert own["sound_peak_bw"] == legs["left"]["vertical_max_mean_bw"]
     work = legs["right"]["joint_work_J_kg"]
@@ -41,6 +41,6 @@ def test_feet_side_by_side_walk_as_alone_and_the_same_episodes():
 
 def test_a_walk_that_falls_has_its_falls_and_no_other_numbers():
     acting, settings = policy_and_settings("thesis_printed", SHORT)
-    own = numbers_of(measure(record(acting, settings, name="thesis_printed", episodes=1)))
+    own = numbers_of_feet(measure(record(acting, settings, name="thesis_printed", episodes=1)))
     assert own["falls"] == 1.0
     assert own["fibre_J_kg_m"] is None or own["push_off_J_kg"] is None
