@@ -48,7 +48,7 @@ PARQUET = {"every_stride.parquet"}  # where pyarrow is installed
 
 def walked(episodes=2, name="schedule", **settings):
     policy, environment = policy_and_settings(name, {"episode_seconds": 6.0} | settings)
-    return record(policy, environment, name=name, episodes=episodes)
+    return record(policy, environment, name=name, episodes=episodes, threads=1)
 
 
 @pytest.fixture(scope="module")
@@ -258,6 +258,7 @@ def test_a_gait_that_was_measured_here_can_be_walked_after(command, folder, tmp_
     curves = folder / "gait_cycle.csv"
     code, out, _ = command("schedule", "--episodes", "1", "--seconds", "10", "--human", str(curves), "--out", "own")
     assert code == 0 and "own: gait_cycle.csv; people's instead: nothing" in out
+    assert "frozen:" not in out  # a schedule has no copy to be walked next
     metrics = json.loads((tmp_path / "own" / "metrics.json").read_text(encoding="utf-8"))
     first = rows_of(curves)[0]
     assert metrics["falls"] == 0
