@@ -74,7 +74,7 @@ def test_a_loosened_limit_is_wider_at_each_of_its_ends():
 
 def test_every_limit_finds_its_number_in_an_evaluation():
     policy, settings = policy_and_settings("schedule", {"episode_seconds": 6.0})
-    metrics = measure(record(policy, settings, name="schedule", episodes=2)).metrics
+    metrics = measure(record(policy, settings, name="schedule", episodes=2, threads=1)).metrics
     values = with_derived(metrics)
     assert all(limit.value(values) is not None for limit in (*WALKS, *HUMAN_LIKE))
     assert values["double_support_percent"] == pytest.approx(11, abs=4)

@@ -48,7 +48,7 @@ def page(tmp_path_factory):
 
 def walked(name):
     policy, settings = policy_and_settings(name, {"episode_seconds": 8.0})
-    return record(policy, settings, name=name, episodes=2)
+    return record(policy, settings, name=name, episodes=2, threads=1)
 
 
 @pytest.fixture(scope="module")

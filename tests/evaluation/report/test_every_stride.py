@@ -14,7 +14,7 @@ from springfoot.evaluation.report.every_stride import STRIDE_KEYS, each_stride, 
 
 def walked(name, **given):
     policy, settings = policy_and_settings(name, {"episode_seconds": 6.0} | given)
-    return record(policy, settings, name=name, episodes=3)
+    return record(policy, settings, name=name, episodes=3, threads=1)
 
 
 @pytest.fixture(scope="module")

@@ -19,7 +19,7 @@ from springfoot.gait.people.gait_events import PERCENT
 @pytest.fixture(scope="module")
 def recording():
     policy, settings = policy_and_settings("schedule", {"episode_seconds": 6.0})
-    return record(policy, settings, name="schedule", episodes=2)
+    return record(policy, settings, name="schedule", episodes=2, threads=1)
 
 
 def test_the_picture_draws_the_walk_over_people(recording, tmp_path):

@@ -66,14 +66,14 @@ SLACK = TRIED_SPRINGS[0].conditions[0.0]
 
 @pytest.mark.slow
 def test_a_slack_device_costs_nothing_to_the_bit():
-    study = Controls(episodes=2, seconds=8.0)
+    study = Controls(episodes=2, seconds=8.0, threads=1)
     slack, sound = study.walk("schedule", [CONTROLS[SLACK], CONTROLS[UNCHANGED]])
     assert slack == sound and sound["fibre_J_kg_m"] is not None
 
 
 @pytest.mark.slow
 def test_the_stiffest_spring_beside_a_sound_calf_saves_nothing():
-    study = Controls(episodes=1, seconds=12.0)
+    study = Controls(episodes=1, seconds=12.0, threads=1)
     asked = [(name, speed) for name in (UNCHANGED, STIFFEST) for speed in (0.8, 1.0, 1.2, 1.4, 1.6)]
     numbers = study.walk("schedule", [{**CONTROLS[name], "speed": speed} for name, speed in asked])
     walks = [{"condition": name, "speed_m_s": speed, **own} for (name, speed), own in zip(asked, numbers, strict=True)]
@@ -84,5 +84,5 @@ def test_the_stiffest_spring_beside_a_sound_calf_saves_nothing():
 
 @pytest.mark.slow
 def test_quick_runs(tmp_path):
-    assert study_main(["controls", "--quick", "--out", str(tmp_path / "out")]) == 0
+    assert study_main(["controls", "--quick", "--threads", "1", "--out", str(tmp_path / "out")]) == 0
     assert "sound" in (tmp_path / "out" / "equal_speeds.csv").read_text()

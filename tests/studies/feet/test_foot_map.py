@@ -51,7 +51,7 @@ def test_flat_stiffness_has_a_row_for_each():
 
 @pytest.mark.slow
 def test_quick_runs(tmp_path):
-    assert study_main(["foot-map", "learned", "--quick", "--out", str(tmp_path / "out")]) == 0
+    assert study_main(["foot-map", "learned", "--quick", "--threads", "1", "--out", str(tmp_path / "out")]) == 0
     assert "36 passive feet" in (tmp_path / "out" / "feet.csv").read_text()
 
 

@@ -13,7 +13,7 @@ SHORT = {"episode_seconds": 6.0}
 
 def test_numbers_are_those_of_the_evaluation():
     acting, settings = policy_and_settings("pretrained", {**SHORT, "right_foot": "passive"})
-    gait = measure(record(acting, settings, name="pretrained", episodes=2))
+    gait = measure(record(acting, settings, name="pretrained", episodes=2, threads=1))
     own, legs = numbers_of_feet(gait), gait.metrics["per_leg"]
     assert set(own) == set(FOOT_NUMBERS)
     assert own["sound_peak_bw"] == legs["left"]["vertical_max_mean_bw"]
@@ -30,10 +30,10 @@ def test_feet_side_by_side_walk_as_alone_and_the_same_episodes():
     weak = {"kind": "weak", "strength": 0.3}
     feet = [{"right_foot": "intact"}, {"left_foot": weak, "right_foot": weak}]
     acting, settings = policy_and_settings("pretrained", {**SHORT, "unevenness_m": 0.01})
-    together = record_feet(acting, settings, feet, name="x", episodes=2, seed=5)
+    together = record_feet(acting, settings, feet, name="x", episodes=2, seed=5, threads=1)
     for worn, recording in zip(feet, together, strict=True):
         acting, settings = policy_and_settings("pretrained", {**SHORT, "unevenness_m": 0.01, **worn})
-        alone = record(acting, settings, name="x", episodes=2, seed=5)
+        alone = record(acting, settings, name="x", episodes=2, seed=5, threads=1)
         assert recording.settings == alone.settings
         assert recording.returns.tobytes() == alone.returns.tobytes()
         assert recording.series["angle"].tobytes() == alone.series["angle"].tobytes()

@@ -13,7 +13,7 @@ from springfoot.studies.feet.price import AS_KNOWN, CASES, plan_prices, price_ta
 
 def walk(**given):
     act, settings = policy_and_settings("schedule", {"episode_seconds": 6.0, **given})
-    return record(act, settings, name="schedule", episodes=2)
+    return record(act, settings, name="schedule", episodes=2, threads=1)
 
 
 def test_a_tendon_moves_the_price_of_its_own_joint_alone():
@@ -51,6 +51,6 @@ def test_the_table_tells_changes_from_the_price_as_it_is():
 
 @pytest.mark.slow
 def test_quick_runs(tmp_path):
-    assert study_main(["price", "--quick", "--out", str(tmp_path / "out")]) == 0
+    assert study_main(["price", "--quick", "--threads", "1", "--out", str(tmp_path / "out")]) == 0
     assert "pretrained,toe's tendon × 2" in (tmp_path / "out" / "prices.csv").read_text(encoding="utf-8")
     assert (tmp_path / "out" / "charges.csv").read_text(encoding="utf-8").count("\n") == 1 + 3 * 2 * 3

@@ -85,7 +85,7 @@ def test_searches_and_studies_measure_as_an_evaluation_does(monkeypatch):
 
     def three():
         toe_off = measure(recording).metrics["toe_off_percent"]
-        step_length = paired_walks(policy, walked, 0.0, range(2), strides=2).unchanged[..., 1]
+        step_length = paired_walks(policy, walked, 0.0, range(2), strides=2, threads=1).unchanged[..., 1]
         return paid_by_search(), toe_off, step_length
 
     paid, toe_off, step_length = three()

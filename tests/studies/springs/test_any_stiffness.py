@@ -24,7 +24,7 @@ from springfoot.studies.springs.any_stiffness import (
 @pytest.fixture(scope="module")
 def walked():
     policy, settings = policy_and_settings("schedule", {"episode_seconds": 8.0})
-    return record(policy, settings, name="schedule", episodes=4)
+    return record(policy, settings, name="schedule", episodes=4, threads=1)
 
 
 def test_the_gaits_own_stiffness_has_the_equilibrium_it_walked_with(walked):

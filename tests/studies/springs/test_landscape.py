@@ -63,7 +63,7 @@ def test_kept_cells_are_not_walked_again(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("springfoot.studies.springs.landscape.ANKLES", (200.0,))
     monkeypatch.setattr("springfoot.studies.springs.landscape.TOES", (28.0,))
     monkeypatch.setattr("springfoot.studies.springs.landscape.ASKED_SPEEDS", (1.0, 1.2))
-    words = ["landscape", "--episodes", "1", "--seconds", "6", "--keep", str(tmp_path / "kept.json")]
+    words = ["landscape", "--episodes", "1", "--seconds", "6", "--threads", "1", "--keep", str(tmp_path / "kept.json")]
     assert study_main([*words, "--out", str(tmp_path / "first")]) == 0
     kept = json.loads((tmp_path / "kept.json").read_text())
     assert len(kept) == 2

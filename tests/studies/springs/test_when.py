@@ -90,7 +90,7 @@ def test_the_verdict_names_the_links_whose_interval_lies_below_0():
 
 @pytest.mark.slow
 def test_quick_has_every_link(tmp_path, capsys):
-    assert study_main(["when", "--quick", "--out", str(tmp_path / "out")]) == 0
+    assert study_main(["when", "--quick", "--seconds", "5", "--threads", "1", "--out", str(tmp_path / "out")]) == 0
     assert "open loop ⊂ linear reflex" in capsys.readouterr().out
     assert (tmp_path / "out/stiffness.png").stat().st_size > 0
 
@@ -98,7 +98,8 @@ def test_quick_has_every_link(tmp_path, capsys):
 @pytest.mark.slow
 def test_kept_costs_and_numbers_are_not_walked_again(tmp_path, monkeypatch, capsys):
     words = ["when", "--generations", "1", "--population", "2", "--episodes", "2", "--aims", "likeness"]
-    words += ["--pushes", "100", "--roughness", "0.01", "--seconds", "5.5", "--keep", str(tmp_path / "kept")]
+    words += ["--pushes", "100", "--roughness", "0.01", "--seconds", "5.5", "--threads", "1"]
+    words += ["--keep", str(tmp_path / "kept")]
     assert study_main([*words, "--out", str(tmp_path / "first")]) == 0
     assert len(list((tmp_path / "kept").iterdir())) == 1 + 7  # numbers, and the costs of seven searches
     monkeypatch.setattr("springfoot.studies.springs.when._batch", None)  # walking again would fail

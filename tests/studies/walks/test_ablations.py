@@ -44,7 +44,7 @@ def test_the_phase_equilibrium_of_the_ablation_is_one_that_can_be_walked():
     own = ablations.phase_schedule(BipedSettings())
     assert len(own.ankle) == len(own.toe) == 10
     settings = BipedSettings(equilibrium="phase", schedule=own, episode_seconds=4.0)
-    assert not record(schedule(settings), settings, name="", episodes=3).fall_reason.any()
+    assert not record(schedule(settings), settings, name="", episodes=3, threads=1).fall_reason.any()
 
 
 class Stop(BaseCallback):

@@ -34,8 +34,8 @@ def test_pairs_fill_the_ranges_of_the_preset_independently():
 def test_a_pair_is_measured_as_if_alone_in_blocks_of_any_size():
     policy, settings = policy_and_settings("schedule", SOME | {"episode_seconds": 5.0})
     who = {"height": np.array([1.7, 1.62]), "mass": np.array([63.0, 110.0]), "speed": np.array([1.2, 1.16])}
-    rows = bodies.walk_pairs(policy, settings, who, name="schedule", seed=3)
-    assert rows == bodies.walk_pairs(policy, settings, who, name="schedule", seed=3, block=1)
+    rows = bodies.walk_pairs(policy, settings, who, name="schedule", seed=3, threads=1)
+    assert rows == bodies.walk_pairs(policy, settings, who, name="schedule", seed=3, block=1, threads=1)
     alone = measure(
         record(*policy_and_settings("schedule", {"episode_seconds": 5.0}), name="", episodes=1, seed=3)
     ).metrics
@@ -66,8 +66,8 @@ def test_the_table_has_falls_apart_and_the_worst_of_those_that_walked():
 
 def test_the_command_prints_a_table_and_writes_a_row_for_each_pair(capsys, tmp_path):
     ranges = [f"--{name.replace('_', '-')} {low:g} {high:g}" for name, (low, high) in SOME.items()]
-    words = ["bodies", "schedule", "--pairs", "2", "--seconds", "6", "--out", str(tmp_path / "new"), *ranges]
-    words = " ".join(words).split()
+    words = ["bodies", "schedule", "--pairs", "2", "--seconds", "6", "--threads", "1", *ranges]
+    words = " ".join([*words, "--out", str(tmp_path / "new")]).split()
     assert study_main(words) == 0
     out = capsys.readouterr().out
     assert "| falls | 0 of 2 |" in out and "2 pairs × 6 s, seed 0: 1.6–1.75 m, 40–120 kg, 1.15–1.25 m/s" in out

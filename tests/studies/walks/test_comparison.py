@@ -27,7 +27,7 @@ THESIS = {"thesis", "thesis_printed"}
 @pytest.fixture(scope="module")
 def rows():
     found = comparison.contenders("schedule", SHORT, constant=(200.0, 30.0), factor=1.2, seed=3)
-    return [comparison.run_row(*each, episodes=2, seed=3) for each in found]
+    return [comparison.run_row(*each, episodes=2, seed=3, threads=1) for each in found]
 
 
 def test_every_spring_that_needs_no_learning_is_a_row(rows):
@@ -55,19 +55,19 @@ def test_a_baseline_earns_the_reward_of_the_policy_it_is_held_against():
     given = {"reward_weights": weights, "episode_seconds": 1.0}
     alone = settings_from(**given)
     (found,) = [each for each in comparison.contenders("schedule", given) if each.name == "constant"]
-    returns = comparison.run_row(*found, episodes=2, seed=3).returns
-    assert np.array_equal(returns, record(constant(alone), alone, name="", episodes=2, seed=3).returns)
+    returns = comparison.run_row(*found, episodes=2, seed=3, threads=1).returns
+    assert np.array_equal(returns, record(constant(alone), alone, name="", episodes=2, seed=3, threads=1).returns)
     plain = settings_from(**(given | {"reward_weights": {}}))
-    assert not np.array_equal(returns, record(constant(plain), plain, name="", episodes=2, seed=3).returns)
+    assert not np.array_equal(returns, record(constant(plain), plain, name="", episodes=2, seed=3, threads=1).returns)
 
 
 def test_a_row_is_what_evaluate_would_find(rows):
     policy, settings = policy_and_settings("schedule", SHORT)
-    assert np.array_equal(rows[0].returns, record(policy, settings, name="", episodes=2, seed=3).returns)
+    assert np.array_equal(rows[0].returns, record(policy, settings, name="", episodes=2, seed=3, threads=1).returns)
 
 
 def test_untrained_is_where_the_policys_own_training_starts():
-    found = {each.name: each for each in comparison.contenders("pretrained", {"episode_seconds": 1.0})}
+    found = {each.name: each for each in comparison.contenders("pretrained", {"episode_seconds": 1.0}, threads=1)}
     assert found["untrained"].settings.action_mode == found["pretrained"].settings.action_mode == "absolute"
     own = found["untrained"]
     returns = comparison.run_row(*own, episodes=1).returns
@@ -77,7 +77,7 @@ def test_untrained_is_where_the_policys_own_training_starts():
 
 
 def test_a_trained_policy_is_held_against_its_open_loop_copy():
-    own, copy, *_ = comparison.contenders("pretrained", {"episode_seconds": 1.0})
+    own, copy, *_ = comparison.contenders("pretrained", {"episode_seconds": 1.0}, threads=1)
     assert copy.name == "frozen:pretrained"
     assert copy.settings == dataclasses.replace(own.settings, action_mode="absolute")
 

@@ -210,7 +210,8 @@ def test_power_on_the_com_from_mean_curves_has_the_measured_push_off():
 
 @pytest.mark.slow
 def test_a_slope_costs_what_lifting_costs_and_kept_walks_are_not_walked_again(tmp_path, monkeypatch, capsys):
-    words = ["effects", "--effects", "slope_up", "--episodes", "2", "--seconds", "6", "--keep", str(tmp_path / "kept")]
+    words = ["effects", "--effects", "slope_up", "--episodes", "2", "--seconds", "6", "--threads", "1"]
+    words += ["--keep", str(tmp_path / "kept")]
     assert study_main([*words, "--out", str(tmp_path / "first")]) == 0
     monkeypatch.setattr("springfoot.studies.base.condition_walks.record_feet", None)  # walking again would fail
     assert study_main([*words, "--out", str(tmp_path / "second")]) == 0

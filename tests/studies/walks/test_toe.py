@@ -104,7 +104,7 @@ def test_published_directions_are_met_where_the_effect_is_planted():
 
 @pytest.mark.slow
 def test_quick_walks_every_toe_and_locked_toes_do_no_work(tmp_path, capsys):
-    assert study_main(["toe", "--quick", "--out", str(tmp_path / "out")]) == 0
+    assert study_main(["toe", "--quick", "--threads", "1", "--out", str(tmp_path / "out")]) == 0
     assert "passive ankles, locked" in capsys.readouterr().out
     walks = list(csv.DictReader((tmp_path / "out/walks.csv").read_text(encoding="utf-8").splitlines()))
     work = {(row["ankles"], row["toe"]): row["toe_positive_J_kg"] for row in walks if row["toe_positive_J_kg"]}
