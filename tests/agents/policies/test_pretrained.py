@@ -13,7 +13,7 @@ from springfoot.evaluation.recording.recording import record
 def walked(name, **settings):
     """The gait of a few episodes."""
     policy, environment = policy_and_settings(name, {"episode_seconds": 10.0} | settings)
-    return measure(record(policy, environment, name=name, episodes=4))
+    return measure(record(policy, environment, name=name, episodes=4, threads=1))
 
 
 @pytest.fixture(scope="module")

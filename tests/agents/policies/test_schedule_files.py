@@ -22,7 +22,7 @@ from springfoot.gait.springs.stiffness import SPRINGS
 
 def walked(name, episodes=4, **given):
     policy, settings = policy_and_settings(str(name), {"episode_seconds": 8.0} | given)
-    return record(policy, settings, name=str(name), episodes=episodes)
+    return record(policy, settings, name=str(name), episodes=episodes, threads=1)
 
 
 @pytest.fixture(scope="module")
@@ -73,7 +73,7 @@ def test_mean_and_spread_of_a_schedule_are_those_put_in():
     def scattered(observation):  # actions are on a log scale
         return policy(observation) + random.normal(0, scatter, (len(observation), 4)).astype(np.float32)
 
-    curves = schedule_curves(record(scattered, settings, name="", episodes=8))
+    curves = schedule_curves(record(scattered, settings, name="", episodes=8, threads=1))
     low, high = settings.ankle_stiffness_range
     expected = 300.0 * 0.05 * np.log(high / low) / 2
     assert curves["ankle_left_stiffness_Nm_per_rad"].mean() == pytest.approx(300.0, rel=0.02)

@@ -89,7 +89,7 @@ def test_a_force_that_alternates_every_window_is_priced():
 
 def test_the_reward_pays_what_a_recording_measures():
     act, settings = policy_and_settings("schedule", {"episode_seconds": 4.0, "push_newton": 100.0})
-    recording = record(act, settings, name="schedule", episodes=2, seed=3)
+    recording = record(act, settings, name="schedule", episodes=2, seed=3, threads=1)
     body = body_of(settings)
     for episode in range(2):
         series = {key: values[episode].astype(float) for key, values in recording.series.items()}
@@ -144,7 +144,7 @@ def test_parts_of_the_work_make_up_that_of_the_joint(name, given):
 @pytest.mark.parametrize(("name", "foot", "joints"), DEVICES, ids=[name for name, *_ in DEVICES])
 def test_a_planted_device_costs_its_muscles_nothing(name, foot, joints):
     act, settings = policy_and_settings("schedule", {"episode_seconds": 1.5, "right_foot": foot})
-    recording = record(act, settings, name=name, episodes=2)
+    recording = record(act, settings, name=name, episodes=2, threads=1)
     moment = recording.series["fibre_moment"][:, :, RIGHT]
     for joint in range(len(JOINTS)):
         fibres = np.nan_to_num(moment[..., joint])

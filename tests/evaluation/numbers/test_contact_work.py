@@ -30,7 +30,7 @@ def walked(policy, given, episodes=2, seconds=8.0, step=PHYSICS_STEP, armature=N
         right = replace(right, ankle=ankle)
     model = build_model(body_of(settings), settings.friction, (left, right))
     model.opt.timestep = step
-    return measure(record(acting, settings, name=policy, episodes=episodes, model=model)).metrics
+    return measure(record(acting, settings, name=policy, episodes=episodes, model=model, threads=1)).metrics
 
 
 def told(metrics):

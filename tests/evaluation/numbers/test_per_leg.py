@@ -229,6 +229,6 @@ def test_a_copy_open_loop_keeps_the_stiffness_of_legs_with_different_feet():
     planted = np.array([[200.0, 30.0], [300.0, 60.0]])  # left and right, ankle and toe
     table = np.broadcast_to(planted, (1, len(GRID), 2, 2))
     body = body_of(settings)
-    copy, absolute = open_loop_copy(follow(table, np.zeros(1), settings, body), settings, name="planted")
+    copy, absolute = open_loop_copy(follow(table, np.zeros(1), settings, body), settings, name="planted", threads=1)
     copied = record(copy, absolute, name="copy", episodes=1).series["stiffness"]
     assert copied[0, 100:300] == pytest.approx(np.broadcast_to(planted, (200, 2, 2)), rel=1e-5)

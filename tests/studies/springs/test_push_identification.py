@@ -23,8 +23,8 @@ PUSHES = {"push_newton": 100.0, "push_interval": 2.0, "episode_seconds": 5.0}
 
 @cache
 def pushed(name, decisions=None, episodes=32):
-    policy, settings = prepare_pushed(name, PUSHES | ({"decisions": decisions} if decisions else {}))
-    return record(policy, settings, name=name, episodes=episodes)
+    policy, settings = prepare_pushed(name, PUSHES | ({"decisions": decisions} if decisions else {}), threads=1)
+    return record(policy, settings, name=name, episodes=episodes, threads=1)
 
 
 def loaded(rows: list[Row]) -> list[Row]:
@@ -62,7 +62,7 @@ def test_legs_that_are_not_alike_are_no_spring_together():
 
 def test_noise_on_the_torque_leaves_the_truth_within_intervals_and_the_undisturbed_estimator_is_blind():
     policy, settings = prepare_pushed("schedule", PUSHES | {"push_newton": 0.0})
-    quiet = samples(record(policy, settings, name="schedule", episodes=4))
+    quiet = samples(record(policy, settings, name="schedule", episodes=4, threads=1))
     rows = loaded(identified(samples(pushed("schedule"), 1.0, seed=1), quiet))
     held = [
         row.pushed.stiffness.low <= row.applied[0] <= row.pushed.stiffness.high for row in rows if row.pushed.stiffness
@@ -83,7 +83,7 @@ def test_a_stiffness_scattered_between_trials_is_found_by_each_trials_own_course
     def scattered(observation):
         return np.clip(policy(observation) + np.tile(shift, (1, 2)), -1.0, 1.0)
 
-    for row in loaded(identified(samples(record(scattered, settings, name="scattered", episodes=32)))):
+    for row in loaded(identified(samples(record(scattered, settings, name="scattered", episodes=32, threads=1)))):
         assert row.pushed.stiffness
         assert row.pushed.stiffness.value == pytest.approx(row.applied[0], rel=0.05)
         assert row.pushed.verdict == SPRING
@@ -148,4 +148,4 @@ def test_bad_input_gets_one_line(words, said, capsys, tmp_path):
 def test_a_policy_that_falls_at_once_is_refused():
     policy, settings = policy_and_settings("thesis", {"episode_seconds": 2.0})
     with pytest.raises(SpringfootError, match="thesis walks no strides"):
-        samples(record(policy, settings, name="thesis", episodes=2))
+        samples(record(policy, settings, name="thesis", episodes=2, threads=1))

@@ -48,7 +48,7 @@ def states():
 @pytest.fixture(scope="module")
 def pairs():
     return {
-        change: paired_walks(*policy_and_settings("schedule", {}), change, range(2), strides=4)
+        change: paired_walks(*policy_and_settings("schedule", {}), change, range(2), strides=4, threads=1)
         for change in (0.0, CHANGE)
     }
 
@@ -208,4 +208,4 @@ def test_steps_as_long_as_strides_are_fast(pairs):
 def test_walks_that_fall_cannot_be_compared():
     policy, settings = policy_and_settings("random", {})
     with pytest.raises(SpringfootError, match="of 2 unchanged walks fewer than two stay up"):
-        paired_walks(policy, settings, CHANGE, range(2), strides=4)
+        paired_walks(policy, settings, CHANGE, range(2), strides=4, threads=1)
