@@ -238,6 +238,7 @@ def test_it_learns(tmp_path):
     """To walk better, by the default reward, than the untrained mean action does on the same fixed seeds."""
     config = TrainingConfig(
         timesteps=131_072,
+        threads=1,
         update_steps=2048,
         learning_rate=1e-3,
         eval_interval=131_072,
