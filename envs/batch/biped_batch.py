@@ -312,14 +312,14 @@ class Biped(ExactState):
         Environments where the mask `active` (N,) is False stay as they are; their reward is 0.
         Raises `SpringfootError` for actions of another shape, and for NaN or infinity.
         """
-        action = real_numbers("actions", actions)
-        if action.shape != (self.num_envs, len(self.action_names)):
-            expected = self.num_envs, len(self.action_names)
-            raise SpringfootError(f"actions must have shape {expected}, got {action.shape}")
-        return self.step_checked(action, active)
+        return self.step_checked(real_numbers("actions", actions), active)
 
     def step_checked(self, action: NDArray, active: NDArray | None = None) -> StepResult:
-        """Step as `step` does, with an `action` that is known to be float64 (N, A), in C order."""
+        """Step as `step` does, with an `action` that is known to be a float64 array in C order, as of
+        `real_numbers`."""
+        expected = self.num_envs, len(self.action_names)
+        if action.shape != expected:
+            raise SpringfootError(f"actions must have shape {expected}, got {action.shape}")
         step = self._decode(action, active)
         self._before_step(step)
         for window in range(self.windows_per_step - 1):

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from .metrics import MOMENT_CURVES, Gait, measure
     from .per_leg import asymmetry, leg_numbers
     from .planned_task import effort_and_impact
-    from .series import foot_contacts, mean_speed, step_lengths, strides_within
+    from .series import foot_contacts, mean_speed, strides_within
     from .tally import StrideTally, add_episode
 
 __all__ = [
@@ -36,7 +36,6 @@ __all__ = [
     "mean_speed",
     "measure",
     "number_text",
-    "step_lengths",
     "stiffness_charge",
     "strides_within",
     "unmet",
@@ -69,7 +68,6 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
             "measure": "metrics",
             "number_text": "criteria",
             "with_derived": "criteria",
-            "step_lengths": "series",
             "stiffness_charge": "measured_effort",
             "strides_within": "series",
             "unmet": "criteria",

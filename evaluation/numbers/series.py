@@ -66,17 +66,6 @@ def strides_within(foot: Contacts, steady: tuple[float, float]) -> NDArray:
     return strides[next_heel_strike <= end]
 
 
-def step_lengths(ankle: NDArray, steps: NDArray, sides: NDArray) -> NDArray:
-    """Return the lengths (P,) [m] of P steps: the other ankle's forward position when the step ends, less this one's
-    when it begins.
-
-    `ankle` (T, side) are forward positions [m]; `steps` (P, 2) and `sides` (P,) as of
-    `gait.people.gait_events.find_steps`, times rounded down to ticks.
-    """
-    begin, end = np.floor(steps / TICK).astype(int).T
-    return ankle[end, 1 - sides] - ankle[begin, sides]
-
-
 def stride_curves(series: dict[str, NDArray], side: int, body: Body, strides: NDArray) -> NDArray:
     """Return one leg's curves over percent of its strides, (S, 101, C) in the order of `GAIT_CYCLE_COLUMNS`.
 

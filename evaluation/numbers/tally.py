@@ -27,7 +27,6 @@ from .series import (
     foot_contacts,
     mean_speed,
     mid_tick,
-    step_lengths,
     stride_curves,
     strides_within,
 )
@@ -203,7 +202,10 @@ def _add_steps(
         cop = _centre_of_pressure(series) - mid_tick(series["ankle"][:, side, 0])
         tally.cop.add(on_percent(cop[:, None], begin, end, TICK, first=TICK / 2))
         tally.reward.add(on_percent(series[REWARD], begin, end, TICK, first=TICK))
-        tally.step_length += list(step_lengths(series["ankle"][..., 0], steps[sides == side], sides[sides == side]))
+        # Step length: x of the other foot, which lands at the step's end, less x of this foot at the step's start.
+        begin_tick, end_tick = np.floor(np.stack([begin, end]) / TICK).astype(int)
+        ankle_x = series["ankle"][..., 0]
+        tally.step_length += list(ankle_x[end_tick, 1 - side] - ankle_x[begin_tick, side])
         tally.step_time += list(end - begin)
         tally.step_sides += [1 - side] * len(begin)
         # The trailing foot leaves the ground within this step; without such a toe-off the body was in flight.

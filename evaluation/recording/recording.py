@@ -1,6 +1,6 @@
 """Record episodes of a policy as 100 Hz series, from which all numbers and pictures of an evaluation are computed."""
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import ceil, isfinite
 from pathlib import Path
@@ -400,7 +400,7 @@ def recorded_steps(
     rows: slice = slice(None),
     steps: int | None = None,
     on_tick: Callable[[Tick], object] = lambda tick: None,
-) -> Iterator[Walked]:
+) -> Generator[Walked, None, None]:
     """Walk one episode in each environment of a batch, write every tick into the series of `kept`, and yield after each
     step.
 
@@ -430,16 +430,18 @@ def recorded_steps(
 
     biped.on_tick = keep
     first = 0  # tick at which the step begins; `last` is that of the next step
-    for walked in walked_steps(biped, act, steps):
-        active, result = walked
-        last = int(ticks.max())
-        kept.series[REWARD][rows, first:last][active] = result.values[active, None, _TERMS]
-        kept.returns[rows][active] += result.reward[active]
-        fell = active & result.terminated
-        kept.fall_reason[rows][fell] = result.reasons[fell]
-        first = last
-        yield walked
-    biped.on_tick = None
+    try:
+        for walked in walked_steps(biped, act, steps):
+            active, result = walked
+            last = int(ticks.max())
+            kept.series[REWARD][rows, first:last][active] = result.values[active, None, _TERMS]
+            kept.returns[rows][active] += result.reward[active]
+            fell = active & result.terminated
+            kept.fall_reason[rows][fell] = result.reasons[fell]
+            first = last
+            yield walked
+    finally:  # also where the caller leaves early
+        biped.on_tick = None
 
 
 def record_walk(

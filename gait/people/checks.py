@@ -79,7 +79,12 @@ MISTAKEN_UNITS = {
 MISTAKEN_BEFORE_MASS = {
     "moment": {"N m/kg where N m must be": 1 / REFERENCE_MASS, "N mm where N m must be": 1e3, "kN m": 1e-3},
     "power": {"W/kg where W must be": 1 / REFERENCE_MASS, "mW": 1e3},
-    "grf": {"body weights where N must be": 1 / (GRAVITY * REFERENCE_MASS), "kN where N must be": 1e-3},
+    "grf": {
+        "body weights where N must be": 1 / (GRAVITY * REFERENCE_MASS),
+        "percent of body weight where N must be": 100 / (GRAVITY * REFERENCE_MASS),
+        "N/kg where N must be": 1 / REFERENCE_MASS,
+        "kN where N must be": 1e-3,
+    },
 }
 """As `MISTAKEN_UNITS`, of curves that are divided by mass or weight after reading."""
 UNITS_TOLD = {"angle": "deg", "moment": "N m/kg", "power": "W/kg", "grf": "body weights"}

@@ -78,8 +78,10 @@ class MeasuredPerson:
 
     def toe_off(self, side: str) -> float | None:
         """Return the mean phase of toe-off of a leg, 0..1; for mean curves that of the file, None if it has none."""
-        begin, off, end = self.legs[side].times.T
-        return float(np.mean((off - begin) / (end - begin))) if len(begin) else self.gait.toe_off
+        leg = self.legs[side]
+        if not len(leg.times):
+            return self.gait.toe_off
+        return float(np.mean(leg.toe_off_phase))
 
 
 def read_person(
@@ -129,7 +131,7 @@ def read_person(
     else:
         walk = replace(read, trusted=trust_units, speed=read.speed if speed is None else speed)
         if skip is None:
-            skip = WARM_UP if walk.last - walk.first >= LONG_WALK else 0.0
+            skip = WARM_UP if round(walk.last - walk.first, 1) >= LONG_WALK else 0.0  # ends of files differ by ticks
         if skip:
             walk = walk.without_start(skip)
             notes.append(f"Left out: the first {skip:g} s.")

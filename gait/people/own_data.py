@@ -34,7 +34,7 @@ from .motion_files import (
     our_columns,
     refuse_impossible_angles,
 )
-from .strides import MeasuredWalk, cut_strides, merge_trials, require_side
+from .strides import MeasuredWalk, cut_strides, merge_trials, require_side, strides_of_legs
 from .visual3d_file import read_visual3d
 
 ACCEPTED = {
@@ -326,15 +326,15 @@ def gait_of_walk(walk: MeasuredWalk, side: str, mass: float | None, trust_units:
             )
     if not trust_units:
         require_plausible_legs(walk, side, mass, people_at(walk.speed))
-    duration = strides[:, 2] - strides[:, 0]
-    stride_time = float(np.mean(duration))
+    stride_time = float(np.mean(strides[:, 2] - strides[:, 0]))
+    legs = strides_of_legs(walk, side, mass)
     gait = OwnGait(
         name=walk.name,
         strides=len(strides),
         speed=walk.speed,
         stride_time=stride_time,
         step_length=None if walk.speed is None else walk.speed * stride_time / 2,
-        toe_off=float(np.mean((strides[:, 1] - strides[:, 0]) / duration)),
+        toe_off=float(np.mean(np.concatenate([leg.toe_off_phase for leg in legs.values()]))),
         mean={},  # `_with_series` puts the series here
         sd={},
     )

@@ -54,10 +54,10 @@ more."""
 EARLY_END = 0.06
 """Most by which the force of a whole stance ends before the motion of the foot tells its toe-off [strides]; chosen: it
 does by 0.01 to 0.044 in walks here, on sound, weak, passive and rigid feet and slopes of 5 deg."""
-WEIGHT_OFF = 0.05
+WEIGHT_OFF = 0.1
 """Largest difference of the mean vertical force of both feet over a step from the body's weight, over it; chosen. More
-than that would change the body's vertical velocity by 0.05 g times the step's 0.55 s, 0.27 m/s. Steps here, with any
-feet and 100 N pushes, differ by 0.035 at most, those of 200 N pushes by 0.08."""
+than that would change the body's vertical velocity by 0.1 g times the step's 0.55 s, 0.5 m/s. Steps here differ by 0.04
+at most, those on a soft passive foot by 0.06, those of 200 N pushes by 0.08."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -114,6 +114,12 @@ class LegStrides:
     forces."""
     partly: NDArray = field(default_factory=lambda: np.zeros(0, bool))
     """(S,) True for strides on a force plate that do not count, as a part of the force is missing."""
+
+    @property
+    def toe_off_phase(self) -> NDArray:
+        """Return the phase of toe-off, 0..1, of the strides that count for forces; of all if none does."""
+        begin, off, end = self.times[self.weighed if self.weighed.any() else slice(None)].T
+        return (off - begin) / (end - begin)
 
     def counted(self, curve: str) -> NDArray:
         """Return `curve` over percent of the strides that count for it, (s, 101).
@@ -286,10 +292,9 @@ def _legs_by_weight(walk: MeasuredWalk, weight: float | None) -> dict[str, LegSt
             times=times, curves=curves, weighed=np.full(len(begin), True), partly=np.full(len(begin), False)
         )
         if "grf_vertical" in curves:
-            on_plate = _on_plate(curves["grf_vertical"], weight)
-            legs[name] = _without_strides(
-                replace(legs[name], weighed=on_plate), _ends_abruptly(curves["grf_vertical"], weight)
-            )
+            legs[name] = replace(legs[name], weighed=_on_plate(curves["grf_vertical"], weight))
+            if not walk.trusted:
+                legs[name] = _without_strides(legs[name], _ends_abruptly(curves["grf_vertical"], weight))
     return legs
 
 
@@ -511,10 +516,14 @@ def _on_plate(vertical: NDArray, weight: float | None) -> NDArray:
 
 
 def _ends_abruptly(vertical: NDArray, weight: float | None) -> NDArray:
-    """Return (S,) True for strides whose force falls by `ABRUPT_UNLOADING` at once; arguments as of `_on_plate`."""
+    """Return (S,) True for strides whose force falls by `ABRUPT_UNLOADING` at once to next to nothing; arguments as of
+    `_on_plate`."""
+    weight = weight or _body_weight(vertical)
     begin = WEIGHT_BEARING[0]
-    fall = vertical[:, begin:-2] - vertical[:, begin + 2 :]  # within 2 %
-    return fall.max(axis=1, initial=-np.inf) >= ABRUPT_UNLOADING * (weight or _body_weight(vertical))
+    after = vertical[:, begin + 2 :]
+    fall = vertical[:, begin:-2] - after  # within 2 %
+    # After an impact force falls as far, but not to nothing.
+    return np.any((fall >= ABRUPT_UNLOADING * weight) & (after < (1.0 - LEAST_PEAK) * weight), axis=1)
 
 
 def _scaled_curves(curves: Series, side: str, unscaled: Collection[tuple[str, str]], mass: float | None) -> Series:

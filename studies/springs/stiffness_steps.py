@@ -19,7 +19,7 @@ from springfoot.envs.control import FEET, PLATEAUS, TOE_OFF, stiffness_ranges
 from springfoot.envs.physics import JOINTS, LEFT, RIGHT, SIDES
 from springfoot.envs.settings import BipedSettings
 from springfoot.errors import SpringfootError
-from springfoot.evaluation.numbers import foot_contacts, step_lengths
+from springfoot.evaluation.numbers import foot_contacts
 from springfoot.evaluation.recording import TICK, WARM_UP, Episodes, recorded_steps
 from springfoot.gait.body import Body
 from springfoot.gait.people import (
@@ -316,10 +316,13 @@ def _movement(com: NDArray, ankle: NDArray, contacts: list[Contacts], landed: ND
     com_at_strikes = sample(com[:, 0], landed, TICK, TICK)
     speed = np.diff(com_at_strikes) / np.diff(landed)
     times, side = find_steps(contacts[LEFT], contacts[RIGHT], landed[0])
-    length = step_lengths(ankle, times, side)
+    # A step goes from one ankle at its beginning to the other ankle at its end, both between ticks: rounded to a tick,
+    # as an evaluation reads a mean step, they are off by as much as a change of stiffness moves them.
+    ankles = sample(ankle, times, TICK, TICK)  # (steps, (begin, end), side)
+    length = np.take_along_axis(ankles[:, 1], 1 - side[:, None], 1) - np.take_along_axis(ankles[:, 0], side[:, None], 1)
     stride = np.searchsorted(landed, times[:, 0], side="right") - 1
     # Sum and number of the steps that begin in each stride.
-    total, count = (np.bincount(stride, weights, len(landed))[: len(clock)] for weights in (length, None))
+    total, count = (np.bincount(stride, weights, len(landed))[: len(clock)] for weights in (length[:, 0], None))
     with np.errstate(invalid="ignore"):  # a stride without a whole step has NaN
         step_length = total / count
     height = on_percent(com[:, 1], landed[:-1], landed[1:], TICK, TICK).mean(1)

@@ -202,12 +202,13 @@ def test_time_runs_out_after_episode_seconds():
         (np.zeros((2, 4)), "actions must have shape (1, 4), got (2, 4)"),
     ],
 )
-def test_bad_actions_are_refused_and_nothing_moves(action, message):
+@pytest.mark.parametrize("step", [Biped.step, Biped.step_checked])
+def test_bad_actions_are_refused_and_nothing_moves(action, message, step):
     biped = Biped(BipedSettings(), 1)
     biped.reset(np.array([0]), [0])
     before = biped.observe()
     with pytest.raises(SpringfootError, match="actions must") as error:
-        biped.step(action)
+        step(biped, action)
     assert str(error.value) == message
     np.testing.assert_array_equal(biped.observe(), before)
 

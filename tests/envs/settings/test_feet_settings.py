@@ -119,7 +119,7 @@ WRONG_NUMBERS: list[tuple[Any, str]] = [
     ({"kind": "adaptive", "ankle_deg": "2"}, "right_foot: ankle_deg must be in [-30, 30] deg, got '2'"),
     (
         {"kind": "rigid", "shank_mass_ratio": 0},
-        "right_foot: shank_mass_ratio must be in [0.1, 6] (of the intact one), got 0",
+        "right_foot: shank_mass_ratio must be in [0.1, 3] (of the intact one), got 0",
     ),
     (
         {"kind": "rigid", "foot_inertia_ratio": -0.5},

@@ -51,9 +51,11 @@ def test_a_walk_that_is_ended_early_keeps_the_series_asked_for_and_shows_every_t
     biped.reset(np.arange(2), [0, 1])
     kept = Episodes.empty(2, 100, ("com", "force"))
     seen = []
-    for number, _ in enumerate(recorded_steps(biped, policy, kept, on_tick=seen.append), start=1):
-        if number == 20:
-            break
+    walk = recorded_steps(biped, policy, kept, on_tick=seen.append)
+    for _ in range(20):
+        next(walk)
+    walk.close()
+    assert biped.on_tick is None  # later steps write nowhere
     assert set(kept.series) == {"com", "force", REWARD}
     assert kept.ticks.tolist() == [40, 40] and len(seen) == 40
     for name, values in kept.series.items():

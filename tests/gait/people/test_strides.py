@@ -5,7 +5,7 @@ import pytest
 
 from springfoot.gait.people.gait_events import Contacts
 from springfoot.gait.people.motion_files import Trial
-from springfoot.gait.people.strides import MeasuredWalk, cut_strides, merge_trials
+from springfoot.gait.people.strides import MeasuredWalk, _ends_abruptly, cut_strides, merge_trials
 
 TICK = 0.01
 
@@ -39,3 +39,11 @@ def test_strides_are_those_of_the_first_method_that_finds_enough(landings, strid
     assert len(found) == strides
     delay = found[0, 0] % 1.0 - 0.25  # the force crosses its threshold after the event's time
     assert (delay > 1e-3) == by_force
+
+
+def test_the_edge_of_a_plate_takes_all_force_at_once_and_an_impact_a_part():
+    percent = np.arange(101)
+    whole = np.sqrt(np.sin(np.pi * np.minimum(percent, 62) / 62).clip(0.0))
+    edge = np.where(percent < 48, whole, 0.0)
+    impact = whole + np.where(percent == 20, 1.2, 0.0)
+    np.testing.assert_array_equal(_ends_abruptly(np.stack([whole, edge, impact]), 1.0), [False, True, False])
