@@ -1,4 +1,4 @@
-"""Run a training, new or resumed, in a folder that holds its policies, its state and its results.
+"""Begin or resume a training in a folder that holds its policies, its state and its results; `session` runs it.
 
 `best.safetensors` and `last.safetensors` are policies, `state-N.safetensors` the checkpoint after N timesteps;
 `run.json` holds the configuration that repeats the run, and its results; TensorBoard's event files stand beside them.

@@ -1,4 +1,4 @@
-"""Compute the numbers of an evaluation: how human the walk is.
+"""Put together the numbers of an evaluation: how human the walk is, from the strides and steps of `tally`.
 
 `measure` is a pure function of a recording, so that anyone can recompute every number from `strides.npz`. Human-facing
 edge: angles in degrees, forces in body weights (BW), moments in N m/kg, work in J/kg.

@@ -39,7 +39,7 @@ class LegMotion:
     """Motion of one leg; from `leg_motion`, or filled in exactly. Segments in the order of `LEG_SEGMENTS`."""
 
     turn: NDArray
-    """(..., 4) segment turns [rad]."""
+    """(..., 4) segment turns [rad], positive with the front up."""
     rate: NDArray
     """(..., 4) rates of the turns [rad/s]."""
     acceleration: NDArray
@@ -140,8 +140,8 @@ def motion_of(value: NDArray, rate: NDArray, acceleration: NDArray) -> LegMotion
 
 
 def spin_rate(body: Body, motion: LegMotion, centre: NDArray) -> NDArray:
-    """Return the rate of change (...) [N m] of a leg's angular momentum about `centre` (..., 2) [m], positive as a
-    turn.
+    """Return the rate of change (...) [N m] of a leg's angular momentum about `centre` (..., 2) [m], positive the way
+    that `LegMotion.turn` is.
 
     `centre` is the CoM of the whole body, so that its own acceleration does not count in the sum over all parts.
     """

@@ -47,8 +47,9 @@ class ProjectionError:
 
 
 def ground_reaction(mass: float, x_acceleration: ArrayLike, z_acceleration: ArrayLike, slope: float = 0.0) -> NDArray:
-    """Return the force (..., 2) forward, up [N] on a body of `mass` [kg] from its CoM acceleration: equation (2), F = m
-    (a - g).
+    """Return the force (..., 2) forward, up [N] on a body of `mass` [kg] from its CoM acceleration.
+
+    It is m (a - g), equation (2) of the thesis.
 
     On a `slope` [rad], uphill positive, forward is along the ground and up at right angles to it.
     """

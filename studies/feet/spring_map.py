@@ -167,16 +167,21 @@ def with_walked_speed(numbers: Mapping[str, Any]) -> dict[str, Any]:
     return {("walked_m_s" if key == "speed_m_s" else key): value for key, value in numbers.items()}
 
 
-def best_springs(even: Sequence[Row]) -> list[dict[str, Any]]:
-    """Return the best spring of each policy, case, walked speed and price, from rows of `at_walked_speeds`.
+def best_springs(rows_at_speeds: Sequence[Row]) -> list[dict[str, Any]]:
+    """Return the best stiffness for each policy, case, walked speed and price, from rows of `at_walked_speeds`.
 
-    A row has the stiffness of the least price (`lowest`), that price, the share by which the dearest spring costs more
-    than it, and the share that it saves against the softest spring; None where fewer than two springs have a price.
+    A row has the stiffness where a parabola through the cheapest springs is lowest (`lowest`), which need not be a
+    walked one, and the price there; the share by which the dearest spring costs more, and the share saved against the
+    softest spring. All are None where fewer than two springs have a price.
     """
     rows = []
     for price in TWO_PRICES:
-        for policy, case, speed in dict.fromkeys((row["policy"], row["case"], row["speed_m_s"]) for row in even):
-            here = [row for row in even if (row["policy"], row["case"], row["speed_m_s"]) == (policy, case, speed)]
+        for policy, case, speed in dict.fromkeys(
+            (row["policy"], row["case"], row["speed_m_s"]) for row in rows_at_speeds
+        ):
+            here = [
+                row for row in rows_at_speeds if (row["policy"], row["case"], row["speed_m_s"]) == (policy, case, speed)
+            ]
             prices = {row["spring"]: row[price] for row in here}
             walked = {spring: value for spring, value in prices.items() if value is not None}
             row = {"policy": policy, "case": case, "speed_m_s": speed, "price": price, "springs": len(walked)}

@@ -300,11 +300,13 @@ def _paired(
 
 
 def _phase_ends(phase: NDArray, stride: NDArray) -> list[int]:
-    """Return the last tick of each of `PHASES` in the first stride, from a leg's `phase` and `stride` at T ticks, (T,)
-    each."""
-    until_next = np.where(stride <= 0, phase, 1.0)  # phase; 1 once the first stride is over
-    begin = np.argmax(stride == 0)
-    return [int(begin + np.argmax(until_next[begin:] >= end)) - 1 for _, end in PHASES.values()]
+    """Return the last tick of each of `PHASES` in a leg's first stride.
+
+    At T ticks, `phase` (T,) is that of the leg in [0, 1), `stride` (T,) the number of its stride, 0 the first.
+    """
+    first = int(np.argmax(stride == 0))  # tick at which the first stride begins
+    phase_or_end = np.where(stride[first:] == 0, phase[first:], 1.0)  # 1 from its end on
+    return [first + int(np.argmax(phase_or_end >= end)) - 1 for _, end in PHASES.values()]
 
 
 def _movement(com: NDArray, ankle: NDArray, contacts: list[Contacts], landed: NDArray, clock: NDArray) -> NDArray:

@@ -127,8 +127,8 @@ def effect_row(
 ) -> dict[str, Any]:
     """Return the row of an effect: published, measured, and how the two agree.
 
-    `walks` is person -> rows of `walked_rows`, empty for an experiment that is not run. An episode counts if no
-    condition falls in it.
+    `experiment` says how the effect is walked, or, as text, why it is not. `walks` is person -> rows of `walked_rows`,
+    empty without a walk. An episode counts if no condition falls in it.
     """
     columns = ("seen", "people", "sign", "size", "unit", "tolerance")
     row: dict[str, Any] = {"effect": published["name"], **{name: published[name] or None for name in columns}}
@@ -151,15 +151,12 @@ def effect_row(
     notes = [experiment.note, *_falls_by_condition(walks.values())]
     if all(map(len, values.values())):
         pairs = np.concatenate(list(values.values()))
-        low, high = mean_interval(pairs) if len(pairs) > 1 else (None, None)
-        mean = float(pairs.mean())
-        also = {words: all(map(holds, measured.values())) for words, holds in experiment.also.items()}
-        row |= {"measured": mean, "low": low, "high": high, "pairs": len(pairs)}
-        row |= {"sign_is": sign_is(published["sign"], low, high)}
-        row |= {"size_within": size_within(published, mean, also)}
+        # Clauses of the published tolerance beside its range.
+        clauses = {words: all(map(holds, measured.values())) for words, holds in experiment.also.items()}
+        row |= _agreement(published, pairs, clauses)
         if len(pairs) < (episodes := sum(len({walk["episode"] for walk in own}) for own in walks.values())):
             notes.append(f"of {len(pairs)} of {episodes} episodes, in which all walk, and as fast")
-        notes += [f"{words}: {'yes' if holds else 'no'}" for words, holds in also.items()]
+        notes += [f"{words}: {'yes' if holds else 'no'}" for words, holds in clauses.items()]
         if any(not np.array_equal(values[person], efforts[person]) for person in values):  # the effect is of energy
             row["effort"] = _mean(list(efforts.values()))
     else:
@@ -173,6 +170,21 @@ def effect_row(
     row |= {"beside": "; ".join(f"{name} {_number_text(value)}" for name, value in beside.items()) or None}
     row |= {"note": "; ".join(filter(None, notes)) or None}
     return row | ({person: _mean([own]) for person, own in values.items()} if len(values) > 1 else {})
+
+
+def _agreement(published: Mapping[str, str], pairs: NDArray, clauses: Mapping[str, bool]) -> dict[str, Any]:
+    """Return the effect measured in N episodes, `pairs` (N,): its mean, its 95 % interval, whether its sign is that
+    published (`sign_is`), and whether its size is within the published tolerance (`size_within`) with its `clauses`."""
+    low, high = mean_interval(pairs) if len(pairs) > 1 else (None, None)
+    mean = float(pairs.mean())
+    return {
+        "measured": mean,
+        "low": low,
+        "high": high,
+        "pairs": len(pairs),
+        "sign_is": sign_is(published["sign"], low, high),
+        "size_within": size_within(published, mean, clauses),
+    }
 
 
 def _with_effort(measured: Measured) -> Measured:
