@@ -150,7 +150,7 @@ def _is_ours(part: Path) -> bool:
 def _rename_finished(part: Path, out: Path) -> None:
     """Rename a finished folder; if another process has taken the name meanwhile, use another name and say so."""
     name = out
-    # The name of a try, or after it out-2, out-3, ...
+    # Try `out`, then out-2, out-3, ...
     for number in count(2):
         try:
             if not is_taken(name):

@@ -254,7 +254,8 @@ def config_from_json(values: dict[str, Any]) -> TrainingConfig:
 
 
 def require_of_rllib(config: TrainingConfig) -> None:
-    """Raise `SpringfootError` for a mirrored network, a GPU and steps of the critic alone, which RLlib has not here."""
+    """Raise `SpringfootError` for settings that the engine RLlib does not support: a mirrored network, a GPU, and steps
+    of the critic alone."""
     if config.mirrored:
         raise SpringfootError("--engine rllib trains no mirrored network: give --mirrored False, or another engine")
     if config.device != "cpu":

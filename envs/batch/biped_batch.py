@@ -315,8 +315,8 @@ class Biped(ExactState):
         return self.step_checked(real_numbers("actions", actions), active)
 
     def step_checked(self, action: NDArray, active: NDArray | None = None) -> StepResult:
-        """Step as `step` does, with an `action` that is known to be a float64 array in C order, as of
-        `real_numbers`."""
+        """Step as `step` does, without a check of the type: `action` must be a float64 array in C order, as
+        `real_numbers` returns it."""
         expected = self.num_envs, len(self.action_names)
         if action.shape != expected:
             raise SpringfootError(f"actions must have shape {expected}, got {action.shape}")

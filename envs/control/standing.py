@@ -185,7 +185,8 @@ class Standing:
     ) -> tuple[NDArray, NDArray, NDArray, NDArray] | None:
         """Begin episodes of bodies `ids` (K,), all `standing` or all walking, on ground of a slope (K,) [rad].
 
-        Returns the posture to stand in, as for `envs.task.initial_state.place`; None for bodies that walk.
+        Returns the posture to stand in: angles (K, side, joint) [rad] and their rates [rad/s], pitch of the trunk (K,)
+        [rad] and forward speed (K,) [m/s]; None for bodies that walk.
         """
         held = self._held
         held["mode"][ids] = STANDING if standing else WALKING

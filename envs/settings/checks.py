@@ -123,7 +123,7 @@ def check_range(name: str, value: Any, unit: str) -> None:
 
 
 def check_bounds(settings: Any) -> None:
-    """Refuse combinations of settings with which an observation or a reward might not be finite."""
+    """Refuse values of settings with which an observation or a reward might not be finite."""
     low, high = STIFFNESS_BOUNDS
     for name in ("ankle_stiffness_range", "toe_stiffness_range"):
         softest, stiffest = getattr(settings, name)

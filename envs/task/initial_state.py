@@ -68,7 +68,8 @@ def place(
         simulation: the N simulations.
         subjects: their bodies and feet.
         ids: (K,) indices of the simulations that start.
-        posture: of `walking_posture` or `Standing.reset`.
+        posture: angles (K, side, joint) [rad] and their rates [rad/s], pitch of the trunk (K,) [rad] and forward speed
+            (K,) [m/s], of `walking_posture` or `Standing.reset`.
         noise: (K, 2, side, joint) relative error of angles ([:, 0]) and rates ([:, 1]) [-].
     """
     angle, velocity, pitch, speed = posture

@@ -476,7 +476,8 @@ def _sections(metrics: dict[str, Any]) -> list[list[TableRow]]:
 
 
 def people_metrics(settings: BipedSettings) -> dict[str, Any]:
-    """Return the numbers of people, or of own data, at the body and speed of `settings`; keys as in metrics.json.
+    """Return the gait's numbers of people, or of the user's own data, at the body and speed of `settings`; keys as in
+    metrics.json.
 
     They are of people's mean curves. Effort is without the toe, whose moment is not measured.
     """

@@ -46,7 +46,8 @@ def write_schedules(folder: Path, recording: Recording) -> None:
 
 
 def schedule_csv(policy: str, body: Body, speed: float, equilibrium: str, curves: Mapping[str, NDArray]) -> str:
-    """Return the text of a schedule over percent of the stride, which is a policy of the name `policy`.
+    """Return the CSV text of the stiffness that was recorded from the policy `policy`, a row for each percent of the
+    stride.
 
     `curves` are (101,) by column as of `schedule_curves`, `equilibrium` is the setting that they need.
     """

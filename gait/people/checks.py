@@ -183,7 +183,7 @@ def is_mass_given(walk: MeasuredWalk, mass: float | None) -> bool:
 
 
 def _bears_downward(force: NDArray) -> bool:
-    """Tell whether a vertical force (T,) is that of a walk upside down: below 0 often, but not always.
+    """Tell whether a vertical force (T,) has the wrong sign: it is below 0 often, but not always.
 
     An empty plate shows noise, or an offset: it is below 0 hardly ever, or all the time.
     """

@@ -310,7 +310,8 @@ class ThesisWalk:
         return {joint: CubicSpline(self.knot_times, np.stack(xz, -1)) for joint, xz in knots.items()}
 
     def _checked_time(self, time: ArrayLike) -> NDArray:
-        """Return the times as an array; raise `SpringfootError` for times outside the knots, a step and a half."""
+        """Return the times as an array; raise `SpringfootError` for times outside the knots, which span a step
+        and a half."""
         time = np.asarray(time, float)
         ends = self.knot_times[[0, -1]]
         # Half a nanosecond: `linspace` may end a rounding error late.

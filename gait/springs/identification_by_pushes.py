@@ -105,7 +105,8 @@ def identify_pushed(
     margin: float = 0.0,
     spacing: float | None = 0.02,
 ) -> tuple[PushedSpring, ...]:
-    """Identify K, beta and a verdict for each phase of the stride, from many strides under random pushes.
+    """Identify K, the damping time beta [s] and whether the torque is a spring's, for each phase of the stride, from
+    many strides under random pushes.
 
     Args:
         torque: (n,) [N m], positive as the angle.

@@ -80,7 +80,7 @@ def _read_word_or_json(words: list[str]) -> str | dict[str, Any]:
 def foot_given(value: str | dict[str, Any]) -> str | dict[str, Any]:
     """Return the foot setting for a flag's value: the foot in the file if the value is a file's name, else the value
     itself."""
-    # A suffix tells the name of a missing file, too: `read_foot` says so.
+    # A word with a suffix is the name of a file, also of a missing one, for which `read_foot` raises.
     if isinstance(value, str) and (Path(value).is_file() or Path(value).suffix):
         return read_foot(value)
     return value

@@ -150,6 +150,8 @@ class Row:
 def identified(pushed: Samples, undisturbed: Samples | None = None, margin: float = 0.0) -> list[Row]:
     """Find the springs of ankle and toe in every phase of `BOUNDS`; return a row for each joint and phase.
 
+    A row's load is the mean size of the torque in its phase, over the largest in the stride.
+
     Args:
         pushed: samples of walking under pushes.
         undisturbed: samples without pushes, for the usual estimator; None leaves it out.

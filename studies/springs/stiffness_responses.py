@@ -111,7 +111,8 @@ def _values(walks: PairedWalks) -> dict[Key, NDArray]:
 
 
 def _link(x: NDArray, y: NDArray) -> tuple[float, float, float, float]:
-    """Return r of two quantities (cells, seeds) over the cells, the ends of its interval, and p of scrambled cells.
+    """Return Pearson's r of two quantities (cells, seeds) over the cells, the ends of its interval, and the p of a test
+    with scrambled cells.
 
     A cell is a joint in a phase (`CELLS`); r is of the means over seeds. Seeds that fall in any cell are left out;
     all four are NaN if fewer than two are left, or if a mean is the same in all cells. It is an entry of

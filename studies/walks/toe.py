@@ -222,7 +222,7 @@ def _csv_row(person: str, row: Row) -> dict[str, Any]:
 
 def verdict(compared: Sequence[Row], beside: Sequence[Row], speed: float) -> str:
     """Return a sentence with the changes by locked and absent toes at a walked `speed` [m/s], and with the number of
-    published directions that are met there.
+    published effects whose sign is the same here.
 
     `compared` are rows of `compared_rows`, `beside` of `beside_rows`.
     """
@@ -236,8 +236,8 @@ def verdict(compared: Sequence[Row], beside: Sequence[Row], speed: float) -> str
         told.append(f"a toe that is {toe} changes {', '.join(changes)}")
     signs = [row["sign_is"] for row in beside if row["speed_m_s"] == speed]
     return (
-        f"Walking {speed:g} m/s, {'; '.join(told)}, against the free toe; of {len(signs)} published directions "
-        f"{signs.count('right')} are met."
+        f"Walking {speed:g} m/s, {'; '.join(told)}, against the free toe; of {len(signs)} published effects "
+        f"{signs.count('right')} have the same sign here."
     )
 
 

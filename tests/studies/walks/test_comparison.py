@@ -208,7 +208,7 @@ def test_in_the_laboratory_a_load_costs_more_and_is_told_beside_the_usual_walk(m
 
 def test_every_condition_of_the_laboratory_has_valid_settings_that_differ():
     settings = [settings_from(**given) for given in LABORATORY.values()]
-    assert len({str(settings_to_json(one)) for one in settings}) == len(LABORATORY) == 7
+    assert len({str(settings_to_json(one)) for one in settings}) == len(LABORATORY) == 10
 
 
 def test_a_policy_that_moves_the_legs_walks_without_copy_and_springs(capsys):
