@@ -107,6 +107,9 @@ def actuator_torque(segments, control, theta, theta_rate, side, joint) -> float:
 def work_muscles(row, m, segments, velocity, control) -> None:
     """Add a control window to the work of the muscles of one body; nothing if no time has passed.
 
+    The joints' positive work is summed, the kept windows move on by one, and the cost of the last window but one is
+    added, which needs the moment after it. The sums begin anew after a judged step.
+
     Args:
         row: of `MUSCLE_ROW`.
         m: of `MEASURED`, at the window's end.

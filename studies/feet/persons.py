@@ -55,7 +55,8 @@ class DrawnEpisode:
 
 
 def feet_in_words(feet: Feet) -> str:
-    """Return kinds and braces of a pair of feet, such as "intact, braced (both)" or "passive"."""
+    """Return kind and brace of a pair of feet, such as "intact, braced (both)" or, of the foot that is not intact,
+    "passive"; of two such feet that differ, the left one's."""
     names = [f"{foot.kind}, braced" if foot.ankle.orthosis else foot.kind for foot in feet]
     left, right = names
     if left == right:

@@ -103,7 +103,8 @@ def _require_two(policies: int) -> None:
 
 
 def agreement_table(of_joints: Sequence[Agreement]) -> str:
-    """Return the Markdown table of the variation of each joint's springs where it carries load."""
+    """Return the Markdown table that says for each joint how much K, theta_eq and torque vary between the policies
+    where it carries load."""
     head = ["joint", "carries load at", "CV of K: mean", "95th percentile", "worst", f"≤ {100 * AGREES:.0f} %"]
     head += ["SD of θ_eq: mean, worst", "SD of torque / peak: mean, worst"]
     lines = []
