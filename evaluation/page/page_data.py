@@ -174,7 +174,7 @@ def _com_panels(recording: Recording, gait: Gait) -> list[dict[str, Any]]:
 def _spring_panels(recording: Recording) -> list[dict[str, Any]]:
     """Return the panels of K and theta_eq over each leg's phase, both legs on one pair of axes.
 
-    The mean over strides is what the policy's copy without feedback would set, the SD how far feedback departs from it.
+    The mean over strides is the course of the policy's copy without feedback, the SD the departure by feedback.
     """
     curves = schedule_curves(recording)
     group = "Stiffness and equilibrium over the leg's phase"
