@@ -259,6 +259,7 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
     | **reward**                |                 |                                                                    |
     | `reward_weights`          | `{}`            | weights that differ from the table above                           |
     | `forward_force_weight`    | `1.0`           | weight of the forward force in the term `grf`, [0, 10]             |
+    | `knee_weight`             | `2.5`           | weight of the knee's error in the term `pose`, [0, 20]             |
 
     and `render_mode`: `"human"`, `"rgb_array"` or None.
 

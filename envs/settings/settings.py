@@ -248,6 +248,8 @@ class BipedSettings:
     """Weights that differ from `DEFAULT_WEIGHTS`, by the name of the reward term [-]."""
     forward_force_weight: float = field(default=1.0, metadata=_REWARD)
     """Weight of the forward force against the vertical one in the term `grf` [0..10]: people's is a fifth as large."""
+    knee_weight: float = field(default=2.5, metadata=_REWARD)
+    """Weight of the knee's squared error in the term `pose` [0..20], where thigh and ankle weigh 3."""
 
     def __post_init__(self) -> None:
         body_of(self)  # raises for an impossible one
@@ -287,6 +289,7 @@ class BipedSettings:
         self._check_person()
         check_weights(self.reward_weights, DEFAULT_WEIGHTS)
         require_number("forward_force_weight", self.forward_force_weight, 0.0, 10.0)
+        require_number("knee_weight", self.knee_weight, 0.0, 20.0)
         check_bounds(self)
 
     @property

@@ -212,8 +212,8 @@ def judge(rows, controls, bodies, table, options, forces, terms) -> None:
 
     Rewards in [0, 1]: `alive`; `speed`, `com_x`, `com_z`, exp(-(error/tolerance)^2) of the CoM against the ZMP plan;
     `zmp`, the same of the CoP of both feet against the planned ZMP, 0 in flight;
-    `pose`, exp(-E/0.02) with E = 1/2 sum over legs of (3, 2.5, 3, 0.1) x squared distance [rad^2] of thigh (to the
-    vertical), knee, ankle and toe from the target at the leg's phase.
+    `pose`, exp(-E/0.02) with E = 1/2 sum over legs of (3, `knee_weight`, 3, 0.1) x squared distance [rad^2] of thigh
+    (to the vertical), knee, ankle and toe from the target at the leg's phase.
     `grf`, exp(-D/0.4) with D the body weights by which the feet's forces leave the target's range: vertical beyond 1.2
     (fourfold), both components beyond mean +- 0.5 SD at the leg's phase, forward times `forward_force_weight`.
     Costs >= 0: `stiffness_rate`, squared change of the action in 20 ms; `stiffness`, mean over legs of
@@ -332,13 +332,14 @@ class Task:
         """(R, SAMPLES, 2, C) of `TARGET`."""
         self._subjects = subjects
         self._feet = feet
+        self._knee_weight = settings.knee_weight
         self.fit(range(len(self.rows)))
 
     def fit(self, ids: Iterable[int]) -> None:
         """Compute scales, units and entries of the feet anew for the present bodies and feet of environments `ids`."""
         for index in ids:
             body = self._subjects.bodies[index]
-            self.rows["scales"][index] = body_scales(body)[0]
+            self.rows["scales"][index] = body_scales(body, self._knee_weight)[0]
             self.rows["units"][index] = units_of(body)
             self.rows["height_ratio"][index] = body.length_scale
             self.rows["worn"][index] = worn_entries(body, self._feet[index])

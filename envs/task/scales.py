@@ -18,9 +18,9 @@ COP_TOLERANCE = 0.04
 SPEED_TOLERANCE = 0.05
 """Error of the CoM's forward speed at which its reward is 1/e [m/s at 1.70 m, scaled with its square root]; chosen: at
 0.10 policies walk too slowly and push off with less than people's moment."""
-POSE_WEIGHTS = {HIP: 3.0, KNEE: 2.5, ANKLE: 3.0, TOE: 0.1}
-"""Weight of each joint's squared error in the pose error E [-]; chosen: the toe counts little, as its curve comes from
-other people than the curves of thigh, knee and ankle."""
+POSE_WEIGHTS = {HIP: 3.0, ANKLE: 3.0, TOE: 0.1}
+"""Weight of a joint's squared error in the pose error E [-], the knee's being the setting `knee_weight`; chosen: the
+toe counts little, as its curve comes from other people than the curves of thigh, knee and ankle."""
 ANKLE_STIFFNESS_UNIT, TOE_STIFFNESS_UNIT = 300.0, 60.0
 """Stiffness that costs one unit [N m/rad at 1.70 m, 63 kg, scaled with mass x height]; chosen, as in mid-stance."""
 TOE_SHARE = 0.25
@@ -41,15 +41,19 @@ SCALES = np.dtype(
 
 
 @lru_cache(maxsize=256)
-def body_scales(body: Body) -> NDArray:
-    """Return the limits, tolerances and units by which the reward judges a body, (1,) of `SCALES`; cached."""
+def body_scales(body: Body, knee_weight: float) -> NDArray:
+    """Return the limits, tolerances and units by which the reward judges a body, (1,) of `SCALES`; cached.
+
+    `knee_weight` is the knee's among `POSE_WEIGHTS`.
+    """
     length = body.length_scale
     scales = np.zeros(1, SCALES)
     scales["min_hip_height"] = MIN_HIP_HEIGHT * length
     lengths = np.array([COM_X_TOLERANCE, COM_Z_TOLERANCE, COP_TOLERANCE]) * length
     com_x, com_z, cop = lengths
     scales["tolerance"] = com_x, com_z, SPEED_TOLERANCE * sqrt(length), cop
-    scales["pose_share"] = [POSE_WEIGHTS[joint] for joint in range(len(JOINTS))]
+    weights = POSE_WEIGHTS | {KNEE: knee_weight}
+    scales["pose_share"] = [weights[joint] for joint in range(len(JOINTS))]
     scales["stiffness_unit"] = np.array([ANKLE_STIFFNESS_UNIT, TOE_STIFFNESS_UNIT]) * body.stiffness_scale
     scales["stiffness_share"] = np.array([1.0, TOE_SHARE]) / (1.0 + TOE_SHARE)
     scales["strength_scale"] = body.strength_scale

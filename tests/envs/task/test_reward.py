@@ -96,6 +96,14 @@ def test_pose_is_the_exponential_of_the_weighted_squared_error(thesis_body, join
     np.testing.assert_allclose(pose, np.exp(-0.5 * weight * 0.1**2 / 0.02), rtol=3e-3)
 
 
+def test_the_knee_s_error_counts_by_its_weight():
+    setup = Setup(knee_weight=7.0)
+    angle = setup.measurement(PHASES).angle.copy()
+    angle[:, LEFT, KNEE] += 0.1
+    pose = setup.terms(setup.measurement(PHASES, angle=angle), PHASES)["pose"]
+    np.testing.assert_allclose(pose, np.exp(-0.5 * 7.0 * 0.1**2 / 0.02), rtol=3e-3)
+
+
 def test_pose_takes_the_thigh_to_the_vertical(thesis_body):
     leaning = thesis_body.measurement(PHASES)
     leaning.base[:, 2] = 0.2
