@@ -10,7 +10,7 @@ export OMP_NUM_THREADS ?= 1
 # On every core, neighbours together as long as no core is idle: what the tests of a file share is made once or twice.
 PYTEST := $(BIN)/python -m pytest --numprocesses auto --dist worksteal
 
-.PHONY: help install walk predict answers test test-all test-wheel test-sdist test-lowest notebooks licences test-learners test-rllib test-kills fuzz extremes mutants check format bench docs lock clean
+.PHONY: help install walk predict answers test test-all test-wheel test-sdist test-lowest notebooks licences test-learners test-rllib test-kills fuzz extremes mutants check format bench benchmark docs lock clean
 
 help:
 	@echo "make walk     train with the defaults, then evaluate what was trained (results in runs/)"
@@ -31,6 +31,7 @@ help:
 	@echo "make docs     build the site in build/site; a warning is an error"
 	@echo "make format   apply the format and the lint fixes"
 	@echo "make bench    cost of a step against MuJoCo's own, and of training; figures in build/bench.json"
+	@echo "make benchmark  springs and our PPO, five seeds, on every frozen task, submitted and judged; hours; goes on after a stop"
 	@echo "make install  only $(VENV), from requirements.lock; the others do it by themselves"
 	@echo "make lock     requirements.lock anew: the versions of constraints.txt with the hash of every file"
 	@echo "make predict  a walk from nothing: plan, leg constants, policy; goes on after a stop"
@@ -216,6 +217,9 @@ FORCE:
 
 bench: install
 	$(BIN)/python -m benchmarks.bench
+
+benchmark: install
+	$(BIN)/python -m benchmarks.tasks
 
 fuzz: install
 	$(BIN)/python -m benchmarks.fuzz_readers --seconds 600

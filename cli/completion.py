@@ -22,6 +22,8 @@ COMMANDS = {
     "person": "person.Person",
     "score": "score.Score",
     "export": "export.ExportFlags",
+    "submit": "submit.SubmitFlags",
+    "judge": "judge.JudgeFlags",
     "datasets": "datasets.DatasetsFlags",
     "examples": "examples.ExamplesFlags",
 }
@@ -97,6 +99,7 @@ def _completed_specification(line: re.Match[str]) -> str:
         "evaluate": ("policy", (*SHIPPED, *BASELINES)),
         "live": ("policy", (*SHIPPED, *BASELINES)),
         "export": ("policy", SHIPPED),
+        "submit": ("policy", (*SHIPPED, *BASELINES)),
         "completion": ("shell", get_args(Shell)),
     }.items():
         # Words are offered as the flags of an option are.

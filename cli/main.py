@@ -32,6 +32,8 @@ COMMANDS = (
     "person",
     "score",
     "export",
+    "submit",
+    "judge",
     "study",
     "datasets",
     "examples",
@@ -47,6 +49,8 @@ HELP = f"""usage: springfoot {{{",".join(COMMANDS)}}} ...
   springfoot person FILE ...        how stiff is this person? ankle and toe from their motion files
   springfoot score FILE ...         how human is any gait? motion files of a walk held against people
   springfoot export POLICY          write it as an ONNX file, which runs without springfoot
+  springfoot submit POLICY          walk it on a frozen task of the benchmark, and write its returns beside it
+  springfoot judge FOLDER ...       repeat submissions, and walk them on seeds that nobody could train for
   springfoot study NAME             hold many walks against each other; springfoot study --help lists some
   springfoot datasets               write Minari sets of walks, for offline learning
   springfoot examples --copy FOLDER copy the programs to start from, for springfoot and other learners
@@ -141,6 +145,14 @@ def _run(words: list[str]) -> int:
                 from .export import export_main
 
                 return export_main(rest, "springfoot export")
+            case ["submit", *rest]:
+                from .submit import submit_main
+
+                return submit_main(rest)
+            case ["judge", *rest]:
+                from .judge import judge_main
+
+                return judge_main(rest)
             case ["study", *rest]:
                 return study_main(rest)
             case ["datasets", *rest]:

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 import tyro
 
-from springfoot.agents.training.config import PRESETS, TrainingConfig, require_of_rllib
+from springfoot.agents.training.config import PRESETS, TrainingConfig, require_of_rllib, task_training
 from springfoot.command_line import end_in_order, exit_code, parse, stopped_by
 from springfoot.envs.settings.settings import CONDITION_SETTINGS, BipedSettings, settings_from, settings_to_json
 from springfoot.errors import MOST_THREADS, SpringfootError, require_count
@@ -51,6 +51,8 @@ class TrainFlags:
     """Training that is known to work, which the other flags change. walk: one body at one speed. any-body: people of
     1.45-2.00 m and 40-120 kg at 0.8-1.6 m/s, drawn anew for each episode, with speeds that change within it. predict:
     one body that follows its own plan, no curve of people's. person: a person who walks on any foot."""
+    task: Annotated[str | None, tyro.conf.arg(metavar="TASK", help_behavior_hint="")] = None
+    """Frozen task of the benchmark, such as Walk-v0 (docs/how-to/benchmark.md), in place of a preset."""
     engine: ENGINES = "sb3"
     """Library that learns: stable-baselines3 on this machine, or RLlib on a Ray cluster (extra `rllib`), that of the
     variable RAY_ADDRESS or this machine. --resume goes on with the engine that began."""
@@ -90,6 +92,8 @@ def run_training(flags: TrainFlags) -> int:
             runs = [flags.out] if (flags.out / RUN).is_file() else runs_within(flags.out)
             hint = f"; to continue a run, give {_for_folders('--resume', runs)}" if runs else ""
             raise SpringfootError(f"{error}{hint}") from None
+    if flags.task is not None and (flags.resume or flags.preset != "walk"):
+        raise SpringfootError("--task begins a training with its own preset; drop --resume or --preset")
     if flags.num_env_runners is not None:
         if flags.engine != "rllib" and flags.out is not None:
             raise SpringfootError("--num-env-runners is of --engine rllib; give that, or drop it")
@@ -114,7 +118,8 @@ def run_training(flags: TrainFlags) -> int:
         record = _resume(flags, settings)
     else:
         assert flags.out is not None
-        config = configured(PRESETS[flags.preset], given(flags.training), given(flags.environment))
+        preset = PRESETS[flags.preset] if flags.task is None else task_training(flags.task)
+        config = configured(preset, given(flags.training), given(flags.environment))
         if flags.seeds is not None:
             return run_seeds(config, flags.out, flags.seeds)
         folder = flags.out

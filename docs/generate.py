@@ -12,9 +12,11 @@ from springfoot.cli.main import STUDIES
 from springfoot.command_line import field_help
 from springfoot.envs.env import SegmentedFootBiped
 from springfoot.envs.settings.settings import THEME_OF, THEMES, BipedSettings
+from springfoot.evaluation.benchmark.leaderboard import leaderboard
 from springfoot.files.markdown import table
 
-FOLDER = Path(__file__).parent / "reference"
+FOLDER = Path(__file__).parent
+SUBMISSIONS = FOLDER.parent / "benchmarks" / "submissions"
 NOTE = "<!-- Made from the code by `make docs`; do not edit. -->"
 COMMANDS = [
     ("`springfoot train`", "train a policy; `train.py` is the same"),
@@ -24,6 +26,8 @@ COMMANDS = [
     ("`springfoot person`", "tell one person's quasi-stiffness from their motion files"),
     ("`springfoot score`", "hold any gait's motion files against people"),
     ("`springfoot export`", "write a policy as an ONNX file"),
+    ("`springfoot submit`", "walk a policy on a frozen task of the benchmark, and write a submission"),
+    ("`springfoot judge`", "repeat submissions, and walk them on seeds drawn from their digest"),
     ("`springfoot datasets`", "write Minari sets of walks, for offline learning"),
     ("`springfoot examples`", "list or copy programs to start from"),
     ("`springfoot completion`", "print the tab completion of commands, policies and flags for bash or zsh"),
@@ -82,9 +86,25 @@ def policies() -> str:
     return "\n\n".join(["# Policies of the package", words, *map(policy_card, SHIPPED)])
 
 
+def benchmark() -> str:
+    """Return the page of the leaderboard."""
+    words = (
+        "Submissions to the frozen tasks, each repeated by `springfoot judge`; at most eight a task. "
+        "[The benchmark](../how-to/benchmark.md) says how they are scored. *Drawn*: seeds and bodies that follow from "
+        "the policy's digest. `make benchmark` makes those of this project."
+    )
+    return f"# Leaderboard\n\n{words}\n\n{leaderboard(SUBMISSIONS)}"
+
+
 def pages() -> dict[str, str]:
-    """Return the text of each page by its name."""
-    texts = {"settings": settings(), "commands": commands(), "observations": observations(), "policies": policies()}
+    """Return the text of each page by its path below `FOLDER`, without suffix."""
+    texts = {
+        "reference/settings": settings(),
+        "reference/commands": commands(),
+        "reference/observations": observations(),
+        "reference/policies": policies(),
+        "results/leaderboard": benchmark(),
+    }
     return {name: f"{NOTE}\n\n{text}\n" for name, text in texts.items()}
 
 

@@ -9,7 +9,16 @@ from typing import Any, Literal, get_args
 
 from springfoot.envs.settings.checks import MOST_ENVIRONMENTS, refusing_unknown
 from springfoot.envs.settings.settings import BipedSettings, settings_from, settings_to_json
-from springfoot.errors import MOST_COUNT, MOST_THREADS, SpringfootError, quoted, require_count, require_number
+from springfoot.errors import (
+    MOST_COUNT,
+    MOST_THREADS,
+    SpringfootError,
+    quoted,
+    require_choice,
+    require_count,
+    require_number,
+)
+from springfoot.tasks import TASKS
 
 WIDEST, DEEPEST, MOST_WEIGHTS = 8192, 32, 2**21
 """Units of the widest hidden layer, number of hidden layers, and number of weights between them at most; chosen: a
@@ -223,6 +232,26 @@ PRESETS: dict[str, TrainingConfig] = {
     ),
 }
 """Name -> training that is known to work."""
+
+
+def task_training(task: str) -> TrainingConfig:
+    """Return the training of a frozen task, such as "Walk-v0": preset `walk`, or where the action moves the person the
+    network and action mode of preset `person`.
+
+    Raises `SpringfootError` for an unknown task.
+    """
+    require_choice("task", task, tuple(TASKS))
+    environment = settings_from(**TASKS[task])
+    if environment.acts == "stiffness":
+        return replace(PRESETS["walk"], environment=environment)
+    person = PRESETS["person"]
+    return replace(
+        PRESETS["walk"],
+        log_std=person.log_std,
+        hidden=person.hidden,
+        mirrored=person.mirrored,
+        environment=replace(environment, action_mode=person.environment.action_mode),
+    )
 
 
 def config_to_json(config: TrainingConfig) -> dict[str, Any]:

@@ -1,0 +1,152 @@
+"""Write a policy with its returns on a frozen task as a submission, read it back, and judge it.
+
+A submission is a folder: `submission.json`, and `policy.safetensors` unless it is a baseline, which has no file.
+Judging it repeats its numbers and adds `judged.json`. No code is in it, and none of its files is run.
+"""
+
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from springfoot.agents.policies.policy import find_policy
+from springfoot.errors import SpringfootError, printable, quoted
+from springfoot.files.json_file import object_with_digest, read_object
+from springfoot.files.provenance import versions_and_commit
+from springfoot.files.text_table import read_bytes
+from springfoot.files.writing import require_new_files, whole_folder, write_new
+
+from .task_walks import EPISODES, TaskWalks, is_baseline, settings_of_task, walk_drawn_from, walk_publicly
+
+SUBMISSION, POLICY, JUDGED = "submission.json", "policy.safetensors", "judged.json"
+"""Files of a submission's folder."""
+MOST_NAME_LETTERS = 60
+"""Most letters of a submission's name; chosen, a cell of a table."""
+MOST_POLICY_BYTES = 2**26
+"""Largest policy file [bytes]; chosen, a thousand times a usual one."""
+SAME = 1e-6
+"""Largest relative difference of mean returns that counts as the same on another processor [-]; chosen."""
+_PACKAGES = ("springfoot", "mujoco", "numpy", "gymnasium")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Submission:
+    """A policy with its returns on the public seeds of one task."""
+
+    folder: Path
+    name: str
+    """Name in the leaderboard."""
+    task: str
+    policy: str
+    """Path of its file, or the name of a baseline."""
+    digest: str
+    """SHA-256 of the policy's file, or of the baseline's name."""
+    walks: TaskWalks
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Judgement:
+    """What repeating a submission gave."""
+
+    repeated: TaskWalks
+    """The public seeds again."""
+    drawn: TaskWalks
+    """Seeds and bodies drawn from the policy's digest."""
+    same_bits: bool
+    """Whether every return was repeated to the last bit."""
+    passes: bool
+    """Whether the mean return agrees within `SAME`, and the falls agree."""
+
+
+def submit(policy: str, task: str, name: str, out: Path | None, threads: int) -> Submission:
+    """Walk a policy on the public seeds of a task and write the submission; return it.
+
+    `out` is a new folder, by default the next free one of runs/submission. Raises `SpringfootError`, with nothing
+    written, for a policy that the task does not take.
+    """
+    settings_of_task(task)  # an unknown task first
+    _require_name(name)
+    content = None if is_baseline(policy) else read_bytes(find_policy(policy), MOST_POLICY_BYTES)
+    digest = sha256(policy.encode() if content is None else content).hexdigest()
+    walks = walk_publicly(policy, task, threads)
+    values = {
+        "name": name,
+        "task": task,
+        "policy": policy if content is None else POLICY,
+        "policy_sha256": digest,
+        "return_mean": float(walks.returns.mean()),
+        "falls": int(walks.fell.sum()),
+        "returns": walks.returns.tolist(),
+        "fell": walks.fell.astype(int).tolist(),
+        "made_with": versions_and_commit(_PACKAGES),
+    }
+    with whole_folder(out, Path("runs", "submission")) as (part, folder):
+        (part / SUBMISSION).write_bytes(object_with_digest(values))
+        if content is not None:
+            (part / POLICY).write_bytes(content)
+    path = policy if content is None else str(folder / POLICY)
+    return Submission(folder=folder, name=name, task=task, policy=path, digest=digest, walks=walks)
+
+
+def read_submission(folder: Path) -> Submission:
+    """Read a submission; raise `SpringfootError`, one line, if a file is missing, damaged, or not the policy walked."""
+    path = folder / SUBMISSION
+    values = read_object(path, "submission")
+    try:
+        name, task, policy, digest = (str(values[key]) for key in ("name", "task", "policy", "policy_sha256"))
+        returns = np.array(values["returns"], float)
+        fell = np.array(values["fell"], bool)
+    except (KeyError, TypeError, ValueError) as error:
+        fault = f"has no {error}" if isinstance(error, KeyError) else f"has no numbers where it should: {error}"
+        raise SpringfootError(f"{path} is no submission: it {printable(fault)}") from None
+    _require_name(name)
+    settings_of_task(task)
+    if returns.shape != (EPISODES,) or fell.shape != (EPISODES,):
+        raise SpringfootError(f"{path} is no submission: it needs {EPISODES} returns and falls")
+    if policy == POLICY:
+        policy = str(folder / POLICY)
+        found = sha256(read_bytes(Path(policy), MOST_POLICY_BYTES)).hexdigest()
+    elif is_baseline(policy):
+        found = sha256(policy.encode()).hexdigest()
+    else:
+        raise SpringfootError(f"{path} names the policy {quoted(policy)}: allowed are {POLICY} and baselines")
+    if found != digest:
+        raise SpringfootError(f"{policy} is not the policy that was submitted: its SHA-256 is {found[:12]}…")
+    walks = TaskWalks(returns=returns, fell=fell)
+    return Submission(folder=folder, name=name, task=task, policy=policy, digest=digest, walks=walks)
+
+
+def judge_submission(submission: Submission, threads: int) -> Judgement:
+    """Walk a submission's public episodes again, and those drawn from its digest; write `JUDGED` if it passes.
+
+    Raises `SpringfootError` for a submission judged before.
+    """
+    path = submission.folder / JUDGED
+    require_new_files([path])
+    repeated = walk_publicly(submission.policy, submission.task, threads)
+    drawn = walk_drawn_from(submission.digest, submission.policy, submission.task, threads)
+    told = submission.walks
+    same_bits = bool(np.array_equal(repeated.returns, told.returns) and np.array_equal(repeated.fell, told.fell))
+    mean, told_mean = repeated.returns.mean(), told.returns.mean()
+    passes = bool(abs(mean - told_mean) <= SAME * abs(told_mean) and np.array_equal(repeated.fell, told.fell))
+    if passes:
+        values: dict[str, Any] = {
+            "policy_sha256": submission.digest,
+            "same_bits": same_bits,
+            "return_mean": float(mean),
+            "falls": int(repeated.fell.sum()),
+            "drawn_return_mean": float(drawn.returns.mean()),
+            "drawn_return_sd": float(drawn.returns.std()),
+            "drawn_falls": int(drawn.fell.sum()),
+            "made_with": versions_and_commit(_PACKAGES),
+        }
+        write_new({path: object_with_digest(values)})
+    return Judgement(repeated=repeated, drawn=drawn, same_bits=same_bits, passes=passes)
+
+
+def _require_name(name: str) -> None:
+    """Raise `SpringfootError` unless a submission's name fits into a cell of a table."""
+    if not name.strip() or len(name) > MOST_NAME_LETTERS or not name.isprintable() or "|" in name:
+        raise SpringfootError(f"name must be 1 to {MOST_NAME_LETTERS} printable letters without |, got {quoted(name)}")

@@ -1,0 +1,77 @@
+"""Define the frozen tasks of the benchmark; `import springfoot` registers each with Gymnasium.
+
+Each task has two ids: `springfoot/Walk-v0`, where the action is the stiffness of ankles and toes and the committed
+person `learned` walks, and `springfoot/WalkBoth-v0`, where the action also moves the person. A task never changes: new
+settings, another person or other physics make a new version. Until springfoot 0.1.0 is released, v0 may change.
+"""
+
+from typing import Any
+
+VERSION = "v0"
+"""Version of every task."""
+SECONDS = 10.0
+"""Length of an episode [s]."""
+HOW_IT_ACTS = ("action_mode",)
+"""Settings that stay a policy's own on every task: how its action becomes a stiffness."""
+_PUSHES = {"push_newton": 100.0}
+_WEAK_CALF = {"kind": "weak", "strength": 0.3}
+
+STIFFNESS_TASKS: dict[str, dict[str, Any]] = {
+    "Walk": {},
+    "Pushed": {"push_newton": 250.0},
+    "AnyBody": {
+        "height_range": [1.5, 1.9],
+        "mass_range": [50.0, 90.0],
+        "speed_range": [0.8, 1.6],
+        "speed_interval": 4.0,
+        **_PUSHES,
+    },
+    "Slopes": {
+        "slope_range_deg": [-5.0, 5.0],
+        "unevenness_m": 0.01,
+        "speed_range": [0.9, 1.5],
+        "speed_interval": 5.0,
+    },
+    "WeakCalf": {"left_foot": _WEAK_CALF, "right_foot": _WEAK_CALF, **_PUSHES},
+    "Prosthesis": {"right_foot": "adaptive", **_PUSHES},
+    "FromThePlan": {"guide": "plan", "reward_weights": {"pose": 0.0, "grf": 0.0}, **_PUSHES},
+}
+"""Name of a task -> settings that differ from the defaults. In FromThePlan body and reward know the plan, no people's
+curve."""
+
+
+def _tasks() -> dict[str, dict[str, Any]]:
+    """Return name with version -> settings of every task, those that set stiffness first."""
+    stiffness, both = {}, {}
+    for name, settings in STIFFNESS_TASKS.items():
+        given = {"episode_seconds": SECONDS, **settings}
+        # On the plan the tuned constants walk: the committed person learned on people's curves.
+        person = {} if settings.get("guide") == "plan" else {"person": "learned"}
+        stiffness[f"{name}-{VERSION}"] = {**person, **given}
+        both[f"{name}Both-{VERSION}"] = {"acts": "both", **given}
+    return stiffness | both
+
+
+TASKS = _tasks()
+"""Name with version, such as "Walk-v0" -> its settings in plain JSON values; its id has `springfoot/` before it."""
+
+FINGERPRINTS = {
+    "Walk-v0": 418.024,
+    "Pushed-v0": 400.188,
+    "AnyBody-v0": 430.034,
+    "Slopes-v0": 422.961,
+    "WeakCalf-v0": 366.902,
+    "Prosthesis-v0": 374.164,
+    "FromThePlan-v0": 60.4732,
+    "WalkBoth-v0": 319.097,
+    "PushedBoth-v0": 286.736,
+    "AnyBodyBoth-v0": 331.83,
+    "SlopesBoth-v0": 288.546,
+    "WeakCalfBoth-v0": 284.579,
+    "ProsthesisBoth-v0": 283.058,
+    "FromThePlanBoth-v0": 51.048,
+}
+"""Task -> mean return of short walks with small random actions [-], on the versions of constraints.txt
+(`springfoot.evaluation.benchmark.task_walks.task_fingerprint`)."""
+PERSON_SHA256 = "320aed1a2fadd83046e8278683850240557dcea98b549b54b32a9b014812d91d"
+"""Digest of the person `learned`, who walks on every v0."""
