@@ -13,6 +13,16 @@ SECONDS = 10.0
 """Length of an episode [s]."""
 HOW_IT_ACTS = ("action_mode",)
 """Settings that stay a policy's own on every task: how its action becomes a stiffness."""
+MUST_AGREE = (
+    "acts",
+    "decisions",
+    "stiffness_joints",
+    "ankle_stiffness_range",
+    "toe_stiffness_range",
+    "schedule",
+    "person_range_deg",
+)
+"""Settings that give an action its meaning: a policy trained with others is refused."""
 _PUSHES = {"push_newton": 100.0}
 _WEAK_CALF = {"kind": "weak", "strength": 0.3}
 

@@ -10,9 +10,9 @@ from springfoot.agents.policies.baselines import BASELINES, own_settings
 from springfoot.agents.training.returns import evaluate_returns
 from springfoot.arrays import NDArray
 from springfoot.envs.batch.biped_batch import Biped
-from springfoot.envs.settings.settings import BipedSettings, settings_from
-from springfoot.errors import SpringfootError, require_choice
-from springfoot.tasks import HOW_IT_ACTS, TASKS
+from springfoot.envs.settings.settings import BipedSettings, settings_from, settings_to_json
+from springfoot.errors import SpringfootError, quoted, require_choice
+from springfoot.tasks import HOW_IT_ACTS, MUST_AGREE, TASKS
 
 EPISODES = 100
 """Episodes of a task, public or drawn."""
@@ -73,7 +73,8 @@ def policy_on_task(policy: str, task: str) -> tuple[PolicyFunction, BipedSetting
     """Return a policy, and the task's settings for it: all the task's own but `HOW_IT_ACTS`.
 
     `policy` is a .safetensors file, a run folder (its best policy), one of the package, or a baseline. Raises
-    `SpringfootError` for another, and for a policy whose action moves other joints than the task's.
+    `SpringfootError` for another, and for a policy whose action means something else there: one trained with
+    another of `MUST_AGREE`.
     """
     settings = settings_of_task(task)
     if is_baseline(policy):
@@ -84,8 +85,12 @@ def policy_on_task(policy: str, task: str) -> tuple[PolicyFunction, BipedSetting
         settings = replace(settings, **own)
         return baseline(policy, settings), settings
     read = read_policy(policy)
-    if read.settings.acts != settings.acts:
-        raise SpringfootError(f"{policy} was trained with acts {read.settings.acts!r}, {task} takes {settings.acts!r}")
+    known, needed = settings_to_json(read.settings), settings_to_json(settings)
+    for name in MUST_AGREE:
+        if known[name] != needed[name]:
+            raise SpringfootError(
+                f"{policy} was trained with {name} {quoted(known[name])}, {task} takes {quoted(needed[name])}"
+            )
     return read, replace(settings, **{name: getattr(read.settings, name) for name in HOW_IT_ACTS})
 
 

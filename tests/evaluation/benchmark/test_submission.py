@@ -3,19 +3,23 @@
 import json
 from dataclasses import replace
 from hashlib import sha256
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from springfoot.agents import read_policy, save_policy
+from springfoot.agents.policies.fingerprint import fingerprint
 from springfoot.cli.judge import judge_main
 from springfoot.cli.main import main
+from springfoot.envs import Biped
 from springfoot.errors import SpringfootError
 from springfoot.evaluation.benchmark import submission as benchmark
 from springfoot.evaluation.benchmark.leaderboard import judged_rows, leaderboard
-from springfoot.evaluation.benchmark.task_walks import policy_on_task, walk_drawn_from
+from springfoot.evaluation.benchmark.task_walks import policy_on_task, walk_drawn_from, walk_publicly
 from springfoot.files.json_file import object_with_digest, read_object
 
+REPOSITORY = Path(__file__).parents[3]
 TASK = "Walk-v0"
 
 
@@ -57,6 +61,33 @@ def test_the_task_decides_every_setting_but_the_action_mode(tmp_path):
     _, plain = policy_on_task("pretrained", TASK)
     _, settings = policy_on_task(str(tmp_path / "bribed.safetensors"), TASK)
     assert settings == replace(plain, action_mode="residual")
+
+
+@pytest.mark.parametrize(
+    ("setting", "value"),
+    [
+        ("decisions", "event"),
+        ("decisions", "100hz"),
+        ("ankle_stiffness_range", (30.0, 500.0)),
+        ("stiffness_joints", "toe"),
+    ],
+)
+def test_a_policy_whose_action_means_something_else_is_refused(setting, value, tmp_path):
+    policy = read_policy("pretrained")
+    settings = replace(policy.settings, **{setting: value})
+    path = tmp_path / "other.safetensors"
+    save_policy(path, replace(policy, settings=settings, fingerprint=fingerprint(Biped(settings, 1))))
+    with pytest.raises(SpringfootError, match=f"was trained with {setting} .*, {TASK} takes"):
+        policy_on_task(str(path), TASK)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("task", ["Slopes-v0", "Prosthesis-v0"])
+def test_a_committed_submission_repeats(task):
+    submission = benchmark.read_submission(REPOSITORY / "benchmarks" / "submissions" / task / "constant")
+    repeated = walk_publicly(submission.policy, task, threads=1)
+    assert repeated.returns.mean() == pytest.approx(submission.walks.returns.mean(), rel=benchmark.SAME)
+    assert np.array_equal(repeated.fell, submission.walks.fell)
 
 
 def test_numbers_that_do_not_repeat_fail(submitted, tmp_path, capsys):
