@@ -270,3 +270,4 @@ WORKS_LIKE_PEOPLE = (
 )
 """Human-like in energy: work of each leg's joints in a stride; people's from their mean power at 1.2 m/s."""
 HUMAN_LIKE = (NO_FALLS, *MOVES_LIKE_PEOPLE, *LOADS_LIKE_PEOPLE, *WORKS_LIKE_PEOPLE)
+"""All criteria of a walk like people's: no falls, and those of movement, load and work."""

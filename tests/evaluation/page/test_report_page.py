@@ -260,14 +260,14 @@ def test_a_name_is_text_and_nothing_else(tmp_path):
 @pytest.mark.slow
 def test_several_policies_have_a_folder_each_and_one_page(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    names = ["...csv", "report.html.csv", "...csv"]
-    for name in names[:2]:
+    names = ["schedule", "...csv", "schedule", "report.html.csv"]
+    for name in names[1::2]:
         head = "percent,ankle_stiffness_Nm_per_rad,toe_stiffness_Nm_per_rad"
         (tmp_path / name).write_text(f"{head}\n0,300,40\n", encoding="utf-8")
     words = [*names, "--episodes", "1", "--seconds", "5"]
     assert evaluate_main(words) == 0
     assert {path.name for path in tmp_path.iterdir()} == {"...csv", "report.html.csv", "runs"}
-    labels = ["policy", "report.html-2", "policy-2"]
+    labels = ["schedule", "policy", "schedule-2", "report.html-2"]
     out = tmp_path / "runs" / f"eval-{'-'.join(labels)}-1"
     assert {path.name for path in out.iterdir()} == {*labels, "report.html"}
     reader = Reader((out / "report.html").read_text(encoding="utf-8"))

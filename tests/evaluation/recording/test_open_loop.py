@@ -114,7 +114,7 @@ def test_a_copy_of_a_policy_has_its_mean_stiffness_and_equilibrium_and_follows_t
     own, settings = policy_and_settings("pretrained", {})
     copy, absolute = copied()
     assert absolute == dataclasses.replace(settings, action_mode="absolute")
-    policy, pushed = walked("pretrained"), walked_copy(**PUSHED | {"episode_seconds": 12.0})
+    policy, pushed = walked("pretrained"), walked("frozen:pretrained", **PUSHED | {"episode_seconds": 12.0})
     assert pushed.series["stiffness"].shape[-1] == 2 and own is not copy
     for joint in ("ankle", "toe"):
         assert of_feedback(pushed, joint, "spread") < 0.02 < of_feedback(policy, joint, "spread")
@@ -136,7 +136,7 @@ def test_a_copy_of_a_policy_has_its_mean_stiffness_and_equilibrium_and_follows_t
 
 @pytest.mark.slow
 def test_a_copy_decides_when_it_is_told_and_keeps_the_stiffness_of_the_policys_own_decisions():
-    (one, at_50), (other, at_100) = copied(), copied(decisions="100hz")  # pretrained decides at 50 Hz
+    (one, at_50), (other, at_100) = copied(decisions="50hz"), copied(decisions="100hz")
     assert (at_50.decisions, at_100.decisions) == ("50hz", "100hz")
     observation = _observed(settings_from(episode_seconds=1.0))
     assert np.array_equal(one(observation), other(observation))
