@@ -45,6 +45,8 @@ def run_judge(flags: JudgeFlags) -> int:
     require_count("threads", flags.threads, 1, MOST_THREADS)
     if not flags.folders:
         raise SpringfootError("name one or more folders of springfoot submit")
+    if len({folder.resolve() for folder in flags.folders}) < len(flags.folders):
+        raise SpringfootError("name each folder once")
     submissions = [read_submission(folder) for folder in flags.folders]  # all are read before the first walks
     if judged := [folder for folder in flags.folders if is_taken(folder / JUDGED)]:
         raise SpringfootError(f"{judged[0]} was judged before: remove its {JUDGED} to judge it again")

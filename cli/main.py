@@ -50,7 +50,7 @@ HELP = f"""usage: springfoot {{{",".join(COMMANDS)}}} ...
   springfoot score FILE ...         how human is any gait? motion files of a walk held against people
   springfoot export POLICY          write it as an ONNX file, which runs without springfoot
   springfoot submit POLICY          walk it on a frozen task of the benchmark, and write its returns beside it
-  springfoot judge FOLDER ...       repeat submissions, and walk them on seeds that nobody could train for
+  springfoot judge FOLDER ...       repeat submissions, and walk them on seeds drawn from their digests
   springfoot study NAME             hold many walks against each other; springfoot study --help lists some
   springfoot datasets               write Minari sets of walks, for offline learning
   springfoot examples --copy FOLDER copy the programs to start from, for springfoot and other learners

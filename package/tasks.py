@@ -1,8 +1,8 @@
 """Define the frozen tasks of the benchmark; `import springfoot` registers each with Gymnasium.
 
 Each task has two ids: `springfoot/Walk-v0`, where the action is the stiffness of ankles and toes and the committed
-person `learned` walks, and `springfoot/WalkBoth-v0`, where the action also moves the person. A task never changes: new
-settings, another person or other physics make a new version. Until springfoot 0.1.0 is released, v0 may change.
+person `learned` walks, and `springfoot/WalkBoth-v0`, where the action also moves hips, knees and ankles. New settings,
+another person or other physics make a new version. Until springfoot 0.1.0 is released, v0 may change.
 """
 
 from typing import Any
@@ -15,6 +15,7 @@ HOW_IT_ACTS = ("action_mode",)
 """Settings that stay a policy's own on every task: how its action becomes a stiffness."""
 MUST_AGREE = (
     "acts",
+    "guide",
     "decisions",
     "stiffness_joints",
     "ankle_stiffness_range",
@@ -66,22 +67,22 @@ TASKS = _tasks()
 """Name with version, such as "Walk-v0" -> its settings in plain JSON values; its id has `springfoot/` before it."""
 
 FINGERPRINTS = {
-    "Walk-v0": 418.024,
-    "Pushed-v0": 400.188,
-    "AnyBody-v0": 430.034,
-    "Slopes-v0": 422.961,
-    "WeakCalf-v0": 366.902,
-    "Prosthesis-v0": 374.164,
-    "FromThePlan-v0": 60.4732,
-    "WalkBoth-v0": 319.097,
-    "PushedBoth-v0": 286.736,
-    "AnyBodyBoth-v0": 331.83,
-    "SlopesBoth-v0": 288.546,
-    "WeakCalfBoth-v0": 284.579,
-    "ProsthesisBoth-v0": 283.058,
-    "FromThePlanBoth-v0": 51.048,
+    "Walk-v0": 2155.9,
+    "Pushed-v0": 1537.88,
+    "AnyBody-v0": 2117.79,
+    "Slopes-v0": 2138.61,
+    "WeakCalf-v0": 1896.89,
+    "Prosthesis-v0": 1965.49,
+    "FromThePlan-v0": 135.11,
+    "WalkBoth-v0": 1407.36,
+    "PushedBoth-v0": 739.0,
+    "AnyBodyBoth-v0": 1056.34,
+    "SlopesBoth-v0": 1005.83,
+    "WeakCalfBoth-v0": 555.663,
+    "ProsthesisBoth-v0": 498.853,
+    "FromThePlanBoth-v0": 119.272,
 }
-"""Task -> mean return of short walks with small random actions [-], on the versions of constraints.txt
+"""Task -> mean return of eight walks with small random actions [-], on the versions of constraints.txt
 (`springfoot.evaluation.benchmark.task_walks.task_fingerprint`)."""
 PERSON_SHA256 = "320aed1a2fadd83046e8278683850240557dcea98b549b54b32a9b014812d91d"
-"""Digest of the person `learned`, who walks on every v0."""
+"""Digest of the person `learned`, who walks on the v0 of every task that sets one."""

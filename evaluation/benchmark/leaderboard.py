@@ -2,39 +2,39 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from springfoot.errors import SpringfootError
 from springfoot.files.json_file import read_object
 from springfoot.files.markdown import table
 from springfoot.tasks import TASKS
 
-from .submission import JUDGED, SUBMISSION
+from .submission import JUDGED, Submission, read_submission
+from .task_walks import EPISODES
 
 MOST_ROWS = 8
 """Most rows of a task's table; chosen, a table that is read."""
+_NUMBERS = ("return_mean", "falls", "drawn_return_mean", "drawn_falls")
 
 
 @dataclass(frozen=True, kw_only=True)
 class JudgedRow:
-    """A judged submission."""
+    """A submission with the numbers of its judgement; none is the submitter's."""
 
-    task: str
-    name: str
-    submitted: dict[str, Any]
-    judged: dict[str, Any]
+    submission: Submission
+    return_mean: float
+    falls: int
+    drawn_return_mean: float
+    drawn_falls: int
 
     @property
     def cells(self) -> list[str]:
         """Return its name, public return and falls, drawn return and falls."""
-        public, drawn = self.submitted, self.judged
-        episodes = len(public["returns"])
         return [
-            self.name,
-            f"{public['return_mean']:.0f}",
-            f"{public['falls']} of {episodes}",
-            f"{drawn['drawn_return_mean']:.0f}",
-            f"{drawn['drawn_falls']} of {episodes}",
+            self.submission.name,
+            f"{self.return_mean:.0f}",
+            f"{self.falls} of {EPISODES}",
+            f"{self.drawn_return_mean:.0f}",
+            f"{self.drawn_falls} of {EPISODES}",
         ]
 
 
@@ -42,16 +42,29 @@ def judged_rows(folder: Path) -> list[JudgedRow]:
     """Return the judged submissions anywhere below a folder, the highest public return first; those of equal return by
     name.
 
-    Raises `SpringfootError` for a damaged file, and for a judgement of another policy.
+    Raises `SpringfootError` for a bad submission, and for a judgement that is damaged, of another policy, or without a
+    number. A judgement is trusted: who keeps the folder makes it, by `springfoot judge`.
     """
     rows = []
     for path in sorted(folder.rglob(JUDGED)):
+        submission = read_submission(path.parent)
         judged = read_object(path, "judgement")
-        submitted = read_object(path.parent / SUBMISSION, "submission")
-        if judged.get("policy_sha256") != submitted.get("policy_sha256"):
-            raise SpringfootError(f"{path} judges another policy than {path.parent / SUBMISSION} submits")
-        rows.append(JudgedRow(task=submitted["task"], name=submitted["name"], submitted=submitted, judged=judged))
-    return sorted(rows, key=lambda row: (-row.submitted["return_mean"], row.name))
+        if judged.get("policy_sha256") != submission.digest:
+            raise SpringfootError(f"{path} judges another policy than {path.parent} submits")
+        try:
+            numbers = {name: float(judged[name]) for name in _NUMBERS}
+        except (KeyError, TypeError, ValueError):
+            raise SpringfootError(f"{path} is no judgement: it needs the numbers {', '.join(_NUMBERS)}") from None
+        rows.append(
+            JudgedRow(
+                submission=submission,
+                return_mean=numbers["return_mean"],
+                falls=int(numbers["falls"]),
+                drawn_return_mean=numbers["drawn_return_mean"],
+                drawn_falls=int(numbers["drawn_falls"]),
+            )
+        )
+    return sorted(rows, key=lambda row: (-row.return_mean, row.submission.name))
 
 
 def leaderboard(folder: Path) -> str:
@@ -60,7 +73,7 @@ def leaderboard(folder: Path) -> str:
     head = ["submission", "return", "falls", "return, drawn", "falls, drawn"]
     parts = []
     for task in TASKS:
-        of_task = [row.cells for row in rows if row.task == task]
+        of_task = [row.cells for row in rows if row.submission.task == task]
         if of_task:
             parts.append(f"## {task}\n\n{table(head, of_task[:MOST_ROWS])}")
             if len(of_task) > MOST_ROWS:

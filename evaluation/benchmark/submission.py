@@ -4,6 +4,7 @@ A submission is a folder: `submission.json`, and `policy.safetensors` unless it 
 Judging it repeats its numbers and adds `judged.json`. No code is in it, and none of its files is run.
 """
 
+import re
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
@@ -27,7 +28,11 @@ MOST_NAME_LETTERS = 60
 MOST_POLICY_BYTES = 2**26
 """Largest policy file [bytes]; chosen, a thousand times a usual one."""
 SAME = 1e-6
-"""Largest relative difference of mean returns that counts as the same on another processor [-]; chosen."""
+"""Largest relative difference of a return that counts as the same on another processor [-]; chosen."""
+LARGEST_RETURN = 1e6
+"""Largest magnitude of an episode's return [-]; chosen, a hundred times the highest that weights allow."""
+_NAME = re.compile(r"[\w ,.:()+-]+")
+"""Letters of a submission's name: none that Markdown or HTML reads."""
 _PACKAGES = ("springfoot", "mujoco", "numpy", "gymnasium")
 
 
@@ -57,7 +62,7 @@ class Judgement:
     same_bits: bool
     """Whether every return was repeated to the last bit."""
     passes: bool
-    """Whether the mean return agrees within `SAME`, and the falls agree."""
+    """Whether every return agrees within `SAME`, and the falls agree."""
 
 
 def submit(policy: str, task: str, name: str, out: Path | None, threads: int) -> Submission:
@@ -105,6 +110,8 @@ def read_submission(folder: Path) -> Submission:
     settings_of_task(task)
     if returns.shape != (EPISODES,) or fell.shape != (EPISODES,):
         raise SpringfootError(f"{path} is no submission: it needs {EPISODES} returns and falls")
+    if not np.all(np.abs(returns) <= LARGEST_RETURN):
+        raise SpringfootError(f"{path} is no submission: a return must be within ±{LARGEST_RETURN:g}")
     if policy == POLICY:
         policy = str(folder / POLICY)
         found = sha256(read_bytes(Path(policy), MOST_POLICY_BYTES)).hexdigest()
@@ -129,13 +136,13 @@ def judge_submission(submission: Submission, threads: int) -> Judgement:
     drawn = walk_drawn_from(submission.digest, submission.policy, submission.task, threads)
     told = submission.walks
     same_bits = bool(np.array_equal(repeated.returns, told.returns) and np.array_equal(repeated.fell, told.fell))
-    mean, told_mean = repeated.returns.mean(), told.returns.mean()
-    passes = bool(abs(mean - told_mean) <= SAME * abs(told_mean) and np.array_equal(repeated.fell, told.fell))
+    near = np.allclose(repeated.returns, told.returns, rtol=SAME, atol=0.0)
+    passes = bool(near and np.array_equal(repeated.fell, told.fell))
     if passes:
         values: dict[str, Any] = {
             "policy_sha256": submission.digest,
             "same_bits": same_bits,
-            "return_mean": float(mean),
+            "return_mean": float(repeated.returns.mean()),
             "falls": int(repeated.fell.sum()),
             "drawn_return_mean": float(drawn.returns.mean()),
             "drawn_return_sd": float(drawn.returns.std()),
@@ -148,5 +155,7 @@ def judge_submission(submission: Submission, threads: int) -> Judgement:
 
 def _require_name(name: str) -> None:
     """Raise `SpringfootError` unless a submission's name fits into a cell of a table."""
-    if not name.strip() or len(name) > MOST_NAME_LETTERS or not name.isprintable() or "|" in name:
-        raise SpringfootError(f"name must be 1 to {MOST_NAME_LETTERS} printable letters without |, got {quoted(name)}")
+    if not name.strip() or len(name) > MOST_NAME_LETTERS or not _NAME.fullmatch(name):
+        raise SpringfootError(
+            f"name must be 1 to {MOST_NAME_LETTERS} letters, digits, spaces and ,.:()+-, got {quoted(name)}"
+        )

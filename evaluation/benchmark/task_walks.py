@@ -1,7 +1,6 @@
 """Walk a policy on a frozen task: its returns on public seeds, and on seeds and bodies drawn from its digest."""
 
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 
@@ -21,8 +20,10 @@ PUBLIC_SEED = 70_000_000
 DRAWN_HEIGHTS, DRAWN_MASSES = (1.55, 1.85), (50.0, 85.0)
 """Ranges of the drawn bodies [m], [kg], where the task itself draws none; chosen, most adults."""
 
-_FINGERPRINT_EPISODES, _FINGERPRINT_SECONDS, _FINGERPRINT_ACTION = 8, 2.0, 0.3
-"""Episodes of a fingerprint, their length [s], and the largest of their random actions [-]; chosen, a second's work."""
+_FINGERPRINT_EPISODES, _FINGERPRINT_ACTION = 8, 0.3
+"""Episodes of a fingerprint, and the largest of their random actions [-]; chosen, a second's work."""
+_FILES = ("people_file", "plan_file")
+"""Settings that name a file: a policy trained with one cannot be read without it."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -47,12 +48,12 @@ def settings_of_task(task: str) -> BipedSettings:
 
 
 def task_fingerprint(task: str) -> float:
-    """Return the mean return [-] of short walks with small random actions on a task, to six digits.
+    """Return the mean return [-] of eight walks with small random actions on a task, to six digits.
 
-    It moves if settings, physics, reward, draws or the person do: `springfoot.tasks.FINGERPRINTS` has the frozen ones.
+    It moves with whatever moves these walks: settings, physics, reward, draws, the person.
+    `springfoot.tasks.FINGERPRINTS` has the frozen ones.
     """
-    settings = replace(settings_of_task(task), episode_seconds=_FINGERPRINT_SECONDS)
-    biped = Biped(settings, _FINGERPRINT_EPISODES, 1)
+    biped = Biped(settings_of_task(task), _FINGERPRINT_EPISODES, 1)
     generator = np.random.default_rng(0)
     size = (_FINGERPRINT_EPISODES, len(biped.action_names))
 
@@ -65,8 +66,8 @@ def task_fingerprint(task: str) -> float:
 
 
 def is_baseline(policy: str) -> bool:
-    """Return True if `policy` names a baseline, such as `constant:300,40`, and no file of that name is here."""
-    return policy.partition(":")[0] in BASELINES and not Path(policy).exists()
+    """Return True if `policy` names a baseline, such as `constant:300,40`; a folder of that name is `./random`."""
+    return policy.partition(":")[0] in BASELINES
 
 
 def policy_on_task(policy: str, task: str) -> tuple[PolicyFunction, BipedSettings]:
@@ -85,6 +86,8 @@ def policy_on_task(policy: str, task: str) -> tuple[PolicyFunction, BipedSetting
         settings = replace(settings, **own)
         return baseline(policy, settings), settings
     read = read_policy(policy)
+    if named := [name for name in _FILES if getattr(read.settings, name) is not None]:
+        raise SpringfootError(f"{policy} needs a file, its {named[0]}, which a submission does not hold")
     known, needed = settings_to_json(read.settings), settings_to_json(settings)
     for name in MUST_AGREE:
         if known[name] != needed[name]:
@@ -103,7 +106,7 @@ def walk_publicly(policy: str, task: str, threads: int) -> TaskWalks:
 def walk_drawn_from(digest: str, policy: str, task: str, threads: int) -> TaskWalks:
     """Walk a policy on seeds that follow from its SHA-256 `digest`, with drawn bodies.
 
-    The seeds change with any change of the policy: nobody can train for them.
+    The seeds change with any change of the policy, so that a training cannot know them.
     """
     act, settings = policy_on_task(policy, task)
     if settings.height_range is None:

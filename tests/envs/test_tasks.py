@@ -30,7 +30,7 @@ def test_every_task_has_both_ids_and_a_fingerprint():
 
 @pytest.mark.parametrize("task", TASKS)
 def test_no_task_has_moved(task):
-    assert task_fingerprint(task) == pytest.approx(FINGERPRINTS[task], rel=1e-5)
+    assert task_fingerprint(task) == pytest.approx(FINGERPRINTS[task], rel=1e-6)
 
 
 def test_the_person_of_the_tasks_is_pinned():

@@ -46,12 +46,21 @@ def copied(submission, folder):
 def test_a_submission_is_judged_to_the_same_bits_on_any_number_of_threads(submitted, tmp_path):
     folders = [copied(each, tmp_path / each.name) for each in submitted]
     assert main(["judge", *map(str, folders), "--threads", "2"]) == 0
+    judged = {folder.name: read_object(folder / benchmark.JUDGED, "judgement") for folder in folders}
+    assert [each["same_bits"] for each in judged.values()] == [True, True]
     rows = judged_rows(tmp_path)
-    assert [row.judged["same_bits"] for row in rows] == [True, True]
-    assert rows[0].submitted["return_mean"] >= rows[1].submitted["return_mean"]
-    assert [row.cells[0] in leaderboard(tmp_path) for row in rows] == [True, True]
-    assert all(row.judged["drawn_return_mean"] != row.submitted["return_mean"] for row in rows)
+    means = {each.name: each.walks.returns.mean() for each in submitted}
+    assert [row.submission.name for row in rows] == sorted(means, key=lambda name: -means[name])
+    for row in rows:
+        told = judged[row.submission.name]
+        assert row.return_mean == means[row.submission.name]
+        assert (row.drawn_return_mean, row.drawn_falls) == (told["drawn_return_mean"], told["drawn_falls"])
+        assert f"| {' | '.join(row.cells)} |" in leaderboard(tmp_path)
     assert main(["judge", str(folders[0])]) == 2  # judged before
+    other = {**judged["ours"], "policy_sha256": "0" * 64}
+    (folders[0] / benchmark.JUDGED).write_bytes(object_with_digest(other))
+    with pytest.raises(SpringfootError, match="judges another policy than"):
+        judged_rows(tmp_path)
 
 
 def test_the_task_decides_every_setting_but_the_action_mode(tmp_path):
@@ -66,6 +75,7 @@ def test_the_task_decides_every_setting_but_the_action_mode(tmp_path):
 @pytest.mark.parametrize(
     ("setting", "value"),
     [
+        ("guide", "plan"),
         ("decisions", "event"),
         ("decisions", "100hz"),
         ("ankle_stiffness_range", (30.0, 500.0)),
@@ -90,10 +100,17 @@ def test_a_committed_submission_repeats(task):
     assert np.array_equal(repeated.fell, submission.walks.fell)
 
 
-def test_numbers_that_do_not_repeat_fail(submitted, tmp_path, capsys):
+@pytest.mark.parametrize("forged", ["one return", "order", "falls"])
+def test_numbers_that_do_not_repeat_fail(submitted, tmp_path, capsys, forged):
     folder = copied(submitted[1], tmp_path / "better")
     values = read_object(folder / benchmark.SUBMISSION, "submission")
-    values["returns"] = [value + 1.0 for value in values["returns"]]
+    match forged:
+        case "one return":
+            values["returns"][7] *= 1 + 1e-5
+        case "order":
+            values["returns"].reverse()  # the same mean
+        case "falls":
+            values["fell"][3] = 1
     (folder / benchmark.SUBMISSION).write_bytes(object_with_digest(values))
     assert judge_main([str(folder)]) == 1
     assert "DOES NOT REPEAT" in capsys.readouterr().out
@@ -124,11 +141,13 @@ def test_a_changed_number_is_refused(submitted, tmp_path):
     [
         ({"task": "Fly-v0"}, "task must be one of"),
         ({"returns": [1.0]}, "it needs 100 returns and falls"),
+        ({"returns": [1e308] * 100}, "a return must be within"),
+        ({"name": "<script>"}, "name must be 1 to 60 letters"),
         ({"returns": "many"}, "has no numbers where it should"),
         ({"policy": "../../somewhere.safetensors"}, "allowed are policy.safetensors and baselines"),
         ({"policy": "os:system"}, "allowed are policy.safetensors and baselines"),
         ({"policy": "constant:1,2"}, "is not the policy that was submitted"),
-        ({"name": "a|b"}, "name must be 1 to 60 printable letters"),
+        ({"name": "a|b"}, "name must be 1 to 60 letters"),
     ],
 )
 def test_a_bad_submission_is_one_line(submitted, tmp_path, change, message):
@@ -166,3 +185,5 @@ def test_the_drawn_episodes_follow_from_the_digest():
     )
     assert np.array_equal(one.returns, again.returns)
     assert not np.array_equal(one.returns, other.returns)
+    same_body = walk_publicly("schedule", TASK, 1)
+    assert one.returns.std() > 1.5 * same_body.returns.std()  # bodies differ, too
