@@ -236,7 +236,7 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
     | `schedule`                | `None`          | a stiffness schedule in JSON form                                  |
     | **person**                |                 |                                                                    |
     | `acts`                    | `"stiffness"`   | the action sets `"stiffness"`, the `"person"`, or `"both"`         |
-    | `person`                  | `"tuned"`       | who walks there: `"tuned"`, `"learned"`, `"learned-2"`, or a file  |
+    | `person`                  | `"tuned"`       | who walks there: `"tuned"`, a person of the package, or a file     |
     | `person_range_deg`        | `14.0`          | largest offset of a rest angle [deg]                               |
     | `stiffness_by`            | `"action"`      | who sets the stiffness where the action moves the person           |
     | **episode**               |                 |                                                                    |

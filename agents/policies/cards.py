@@ -15,6 +15,11 @@ LEARNED_2_BY = "`, then `".join(
     for begin, weights, out in (("learned", (4, -5), "runs/first"), ("runs/first", (7, -6), "runs/second"))
 )
 """Commands that made `learned-2` from `learned`."""
+LEARNED_3_BY = (
+    "springfoot train --preset person --begin-from learned`, then once more from what came of it, with the settings in "
+    "`docs/results/csv/learned_3.json"
+)
+"""Commands that made `learned-3` from `learned`."""
 MADE = {
     "pretrained": ("Walks on level ground at 1.2 m/s, and goes on when it is pushed.", PRETRAINED_BY, "walk"),
     "medium": (
@@ -31,6 +36,12 @@ MADE = {
     "learned-2": (
         "Went on from `learned`: falls less, holds speed better, works a little more; knees are farther from people's.",
         LEARNED_2_BY,
+        "feet",
+    ),
+    "learned-3": (
+        "Went on from `learned` at four times its prices: falls least, lands softest; its knees are farther from "
+        "people's.",
+        LEARNED_3_BY,
         "feet",
     ),
 }

@@ -55,6 +55,7 @@ SHIPPED = {
     "predicted": _PRETRAINED / "predicted.safetensors",
     "learned": person_file("learned"),
     "learned-2": person_file("learned-2"),
+    "learned-3": person_file("learned-3"),
 }
 """Name of a policy of this package -> its file; `policy_card` describes each."""
 PRETRAINED_BY = "springfoot train --push-newton 250 --timesteps 14000000 --out runs/pretrained"

@@ -24,7 +24,7 @@ from ..task.observation_entries import PERSON_OBSERVATION
 
 PERSONS_FOLDER = Path(__file__).parent / "persons"
 """Folder of the persons that come with the package."""
-LEARNED = {"learned": "learned-1", "learned-1": "learned-1", "learned-2": "learned-2"}
+LEARNED = {"learned": "learned-1", "learned-1": "learned-1", "learned-2": "learned-2", "learned-3": "learned-3"}
 """Name of a person of this package -> its file in `PERSONS_FOLDER`, without suffix. The first is `last.safetensors` of
 `springfoot train --preset person`, when it drew fewer pairs of feet; the second went on from it, as its card says
 (`springfoot.agents.policies.cards`)."""

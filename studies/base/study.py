@@ -156,7 +156,7 @@ class PersonsStudy(WalkingStudy):
     """A study that walks learned persons, and keeps the numbers of each walk."""
 
     persons: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="PERSON ...")] = ("learned",)
-    """Policies that move the person: run folders, files, `learned` or `learned-2`."""
+    """Policies that move the person: run folders, files, or those of the package, such as `learned`."""
     episodes: int = 5
     """Episodes of each condition and commanded speed."""
     seconds: float = 12.0

@@ -125,7 +125,7 @@ class FootChoice(WalkingStudy):
     foot: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="FOOT")] = ()
     """A foot, as of --right-foot: a kind, JSON, or a file; once for each foot."""
     persons: Annotated[tuple[str, ...], tyro.conf.arg(metavar="PERSON ...")] = ("learned",)
-    """Persons that adapt to the feet: run folders, files, `learned` or `learned-2`."""
+    """Persons that adapt to the feet: run folders, files, or those of the package, such as `learned`."""
     push_newton: float = 100.0
     """Size of the pushes in the pushed walks [N]."""
     episodes: int = 5

@@ -81,7 +81,7 @@ class FootMap(WalkingStudy):
     """Walk learned persons on a map of feet, told the truth and told that the foot is sound."""
 
     persons: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="PERSON ...")] = ("learned",)
-    """Policies that move the person: run folders, files, `learned` or `learned-2`."""
+    """Policies that move the person: run folders, files, or those of the package, such as `learned`."""
     speed: float = 1.2
     """Commanded speed [m/s]."""
 

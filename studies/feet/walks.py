@@ -55,7 +55,7 @@ class Walks(WalkingStudy):
     """How does a learned person walk on each foot? Records it over foot, mass and speed, and writes a page of it."""
 
     person: str = "learned"
-    """Person that adapts to the feet: a run folder, a file, `learned` or `learned-2`."""
+    """Person that adapts to the feet: a run folder, a file, or one of the package, such as `learned`."""
     foot: Annotated[tuple[str, ...], tyro.conf.arg(metavar="FOOT"), tyro.conf.UseAppendAction] = ()
     """A foot, as of --right-foot: a kind, JSON, or a file; once for each foot. Without it eight feet are compared."""
     side: Literal["left", "right", "both"] = "right"

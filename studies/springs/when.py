@@ -76,7 +76,7 @@ class When(WalkingStudy):
     """Search constant, phased, open-loop and reflexive stiffness, each within the next, and tell the gain of each."""
 
     person: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PERSON")] = "learned"
-    """Policy that moves the person, and stays as it is: a run folder, a file, `learned` or `learned-2`."""
+    """Policy that moves the person, and stays as it is: a run folder, a file, or one such as `learned`."""
     episodes: int = 12
     """Episodes of each class and condition of the test."""
     seconds: float = 6.0
