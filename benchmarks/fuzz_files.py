@@ -3,6 +3,7 @@
 import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,9 @@ from springfoot.envs.control.constants import constants_from
 from springfoot.envs.control.reference_walk import reference_walks
 from springfoot.envs.settings.settings import BipedSettings, settings_from, settings_to_json
 from springfoot.errors import SpringfootError
+from springfoot.evaluation.benchmark.leaderboard import leaderboard
+from springfoot.evaluation.benchmark.submission import JUDGED, SUBMISSION, read_submission
+from springfoot.evaluation.benchmark.task_walks import EPISODES
 from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.evaluation.recording.recording import Recording, load_recording, record
 from springfoot.evaluation.report.schedule_tables import finite_states, write_schedules
@@ -92,6 +96,8 @@ def readers(folder: Path) -> dict[str, Reader]:
         "styles of a search": Reader(read=_styles, suffix=".json", bases=(STYLES.read_bytes(),)),
         "costs of a search": Reader(read=_search, suffix=".json", bases=(_searched(folder),)),
         "numbers of a study": Reader(read=Kept, suffix=".json", bases=(b'{"[1, \\"a\\"]": {"falls": 0.0}}',)),
+        "submission": Reader(read=_submission(folder), suffix=".json", bases=(_submitted(),)),
+        "judgement": Reader(read=_judgement(folder), suffix=".json", bases=(_judged(),)),
         "setting in JSON": Reader(
             read=_setting, suffix=".json", bases=tuple(json.dumps(foot).encode() for foot in _FEET)
         ),
@@ -107,6 +113,43 @@ def readers(folder: Path) -> dict[str, Reader]:
 def _write(path: Path, content: bytes) -> Path:
     path.write_bytes(content)
     return path
+
+
+# Submissions to the benchmark ---------------------------------------------------------------------------------
+
+
+def _submitted() -> bytes:
+    digest = sha256(b"schedule").hexdigest()
+    episodes = {"returns": [1.5] * EPISODES, "fell": [0] * EPISODES}
+    return json.dumps(
+        {"name": "ours", "task": "Walk-v0", "policy": "schedule", "policy_digest": digest, **episodes}
+    ).encode()
+
+
+def _judged() -> bytes:
+    numbers = {"return_mean": 1.5, "falls": 0, "drawn_return_mean": 1.25, "drawn_falls": 1}
+    return json.dumps({"policy_digest": sha256(b"schedule").hexdigest(), **numbers}).encode()
+
+
+def _submission(folder: Path) -> Callable[[Path], Any]:
+    (folder / "submitted").mkdir()
+
+    def read(path: Path) -> Any:
+        _write(folder / "submitted" / SUBMISSION, path.read_bytes())
+        return read_submission(folder / "submitted").walks.summary
+
+    return read
+
+
+def _judgement(folder: Path) -> Callable[[Path], Any]:
+    (folder / "judged").mkdir()
+    _write(folder / "judged" / SUBMISSION, _submitted())
+
+    def read(path: Path) -> Any:
+        _write(folder / "judged" / JUDGED, path.read_bytes())
+        return leaderboard(folder / "judged")
+
+    return read
 
 
 # Policies, states, records -----------------------------------------------------------------------------------

@@ -3,12 +3,12 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from springfoot.errors import SpringfootError
+from springfoot.errors import SpringfootError, require_number
 from springfoot.files.json_file import read_object
 from springfoot.files.markdown import table
 from springfoot.tasks import TASKS
 
-from .submission import JUDGED, Submission, read_submission
+from .submission import JUDGED, LARGEST_RETURN, Submission, read_submission
 from .task_walks import EPISODES
 
 MOST_ROWS = 8
@@ -49,11 +49,11 @@ def judged_rows(folder: Path) -> list[JudgedRow]:
     for path in sorted(folder.rglob(JUDGED)):
         submission = read_submission(path.parent)
         judged = read_object(path, "judgement")
-        if judged.get("policy_sha256") != submission.digest:
+        if judged.get("policy_digest") != submission.digest:
             raise SpringfootError(f"{path} judges another policy than {path.parent} submits")
         try:
-            numbers = {name: float(judged[name]) for name in _NUMBERS}
-        except (KeyError, TypeError, ValueError):
+            numbers = {name: require_number(name, judged[name], -LARGEST_RETURN, LARGEST_RETURN) for name in _NUMBERS}
+        except (KeyError, SpringfootError):
             raise SpringfootError(f"{path} is no judgement: it needs the numbers {', '.join(_NUMBERS)}") from None
         rows.append(
             JudgedRow(

@@ -80,7 +80,7 @@ def submit(policy: str, task: str, name: str, out: Path | None, threads: int) ->
         "name": name,
         "task": task,
         "policy": policy if content is None else POLICY,
-        "policy_sha256": digest,
+        "policy_digest": digest,
         "return_mean": float(walks.returns.mean()),
         "falls": int(walks.fell.sum()),
         "returns": walks.returns.tolist(),
@@ -100,10 +100,10 @@ def read_submission(folder: Path) -> Submission:
     path = folder / SUBMISSION
     values = read_object(path, "submission")
     try:
-        name, task, policy, digest = (str(values[key]) for key in ("name", "task", "policy", "policy_sha256"))
+        name, task, policy, digest = (str(values[key]) for key in ("name", "task", "policy", "policy_digest"))
         returns = np.array(values["returns"], float)
         fell = np.array(values["fell"], bool)
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
         fault = f"has no {error}" if isinstance(error, KeyError) else f"has no numbers where it should: {error}"
         raise SpringfootError(f"{path} is no submission: it {printable(fault)}") from None
     _require_name(name)
@@ -140,7 +140,7 @@ def judge_submission(submission: Submission, threads: int) -> Judgement:
     passes = bool(near and np.array_equal(repeated.fell, told.fell))
     if passes:
         values: dict[str, Any] = {
-            "policy_sha256": submission.digest,
+            "policy_digest": submission.digest,
             "same_bits": same_bits,
             "return_mean": float(repeated.returns.mean()),
             "falls": int(repeated.fell.sum()),

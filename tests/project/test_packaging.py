@@ -116,7 +116,7 @@ def test_wheel_holds_every_file_of_the_rooms(wheel, known):
     packed = [name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name]
     ours = [name.removeprefix("package/") for name in known if name.partition("/")[0] in ("package", *ROOMS)]
     ours += [
-        name for name in known if re.fullmatch(r"docs/.+\.(md|csv)|docs/generate\.py", name)
+        name for name in known if re.fullmatch(r"docs/.+\.(md|csv|json)|docs/generate\.py", name)
     ]  # pages and their maker
     assert sorted(packed) == sorted(f"springfoot/{name}" for name in ours)
     assert "springfoot/py.typed" in packed

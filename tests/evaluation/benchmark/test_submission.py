@@ -57,7 +57,7 @@ def test_a_submission_is_judged_to_the_same_bits_on_any_number_of_threads(submit
         assert (row.drawn_return_mean, row.drawn_falls) == (told["drawn_return_mean"], told["drawn_falls"])
         assert f"| {' | '.join(row.cells)} |" in leaderboard(tmp_path)
     assert main(["judge", str(folders[0])]) == 2  # judged before
-    other = {**judged["ours"], "policy_sha256": "0" * 64}
+    other = {**judged["ours"], "policy_digest": "0" * 64}
     (folders[0] / benchmark.JUDGED).write_bytes(object_with_digest(other))
     with pytest.raises(SpringfootError, match="judges another policy than"):
         judged_rows(tmp_path)

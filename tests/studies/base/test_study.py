@@ -108,7 +108,9 @@ def test_help_lists_the_studies_that_users_ask_for_and_all_of_them_when_asked(ca
 def test_unknown_commands_and_studies_are_one_line_that_names_those_there_are(capsys):
     assert (main(["walk"]), main(["study", "walk"])) == (2, 2)
     first, second = capsys.readouterr().err.splitlines()
-    known = "train, evaluate, live, feet, person, score, export, study, datasets, examples and completion"
+    known = (
+        "train, evaluate, live, feet, person, score, export, submit, judge, study, datasets, examples and completion"
+    )
     assert first == f"springfoot: error: no command 'walk'; there are {known}"
     assert second.startswith("springfoot study: error: no study 'walk'; there are compare, bodies, ")
 
