@@ -9,7 +9,7 @@ from typing import Annotated
 import tyro
 
 from springfoot.command_line import end_in_order, exit_code, parse
-from springfoot.errors import MOST_THREADS, require_count
+from springfoot.errors import MOST_THREADS, SpringfootError, require_count
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,11 +44,11 @@ def run_submit(flags: SubmitFlags) -> None:
     from springfoot.compiling import tell_of_compiling
     from springfoot.evaluation.benchmark.submission import submit  # not above: help needs no simulator
     from springfoot.evaluation.recording import policy_label
-    from springfoot.files.writing import require_new
+    from springfoot.files.writing import is_taken
 
     require_count("threads", flags.threads, 1, MOST_THREADS)
-    if flags.out is not None:
-        require_new(flags.out)
+    if flags.out is not None and is_taken(flags.out):
+        raise SpringfootError(f"{flags.out} exists already: out must be a new folder")
     end_in_order()
     tell_of_compiling()
     name = policy_label(flags.policy) if flags.name is None else flags.name

@@ -118,6 +118,17 @@ def test_flags_take_the_place_of_the_preset():
     assert train_command.configured(PRESETS["any-body"], {}, {"height_range": None}).environment.height_range is None
 
 
+def test_a_task_takes_no_preset_and_no_other_action(tmp_path, capsys):
+    words = ["--task", "Walk-v0", "--out", str(tmp_path / "run")]
+    for more, message in (
+        (["--preset", "person"], "--task begins a training with its own preset; drop --resume or --preset"),
+        (["--decisions", "event"], "--task decides what an action means; drop --decisions"),
+    ):
+        assert train_command.train_main([*words, *more]) == 2
+        assert capsys.readouterr().err == f"train.py: error: {message}\n"
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_given_weights_leave_the_others_of_the_preset():
     preset = PRESETS["person"]
     weights = train_command.configured(preset, {}, {"reward_weights": {"pose": 1.0}}).environment.reward_weights

@@ -170,6 +170,7 @@ def test_a_bad_submission_is_one_line(submitted, tmp_path, change, message):
         (["thesis", "--task", TASK], "thesis needs action_mode, equilibrium, schedule of its own"),
         (["nobody", "--task", TASK], "no policy nobody"),
         (["schedule", "--task", "Walk"], "task must be one of 'Walk-v0'"),
+        (["schedule", "--task", TASK, "--out", "."], ". exists already: out must be a new folder"),
     ],
 )
 def test_a_policy_that_a_task_does_not_take_is_refused(words, message, tmp_path, capsys, monkeypatch):
