@@ -144,7 +144,7 @@ def end_step(controls, tasks, physics, forces, target, task, walking, running, o
     terms = np.empty((len(running), len(task[0].weights)))
     judge(tasks, controls, bodies, target, task, forces, terms)
     total(terms, task, outcome.reward)
-    remember(tasks, bodies, task, running)
+    remember(tasks, controls, bodies, target, task, running)
     _average_forces(tasks, forces, running)
     any_terminated = end_episodes(
         tasks, terms[:, ALIVE], running, task[0].most_steps, outcome.terminated, outcome.truncated

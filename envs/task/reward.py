@@ -54,11 +54,11 @@ OFFSET_UNIT = 0.25
 TERMS: tuple[str, ...] = (
     *("alive", "speed", "com_x", "com_z", "zmp", "pose", "grf"),
     *("stiffness_rate", "stiffness", "effort", "fibre_work", "activation", "impact"),
-    *("speed_held", "person_rate", "acceleration"),
+    *("speed_held", "person_rate", "acceleration", "step_length"),
 )
 """Reward terms in the order of their sum: rewards, then costs."""
 ALIVE, SPEED, COM_X, COM_Z, ZMP, POSE, GRF, STIFFNESS_RATE, STIFFNESS, *_ = range(len(TERMS))
-EFFORT, FIBRE_WORK, ACTIVATION, IMPACT, SPEED_HELD, PERSON_RATE, SMOOTHNESS = range(STIFFNESS + 1, len(TERMS))
+EFFORT, FIBRE_WORK, ACTIVATION, IMPACT, SPEED_HELD, PERSON_RATE, SMOOTHNESS, STEP = range(STIFFNESS + 1, len(TERMS))
 TASK_OPTIONS = np.dtype(
     [
         ("weights", float, len(TERMS)),  # of the reward's terms
@@ -178,13 +178,35 @@ def _acceleration(row, m, seconds):
 
 
 @part
-def remember(rows, bodies, options, running) -> None:
-    """Write mean speed and joint velocities of the bodies `running` (N,) into `rows`, for the next step's reward."""
+def _step_error(control, target, length):
+    """Return the distance of a step's `length` [m] from the planned one, over that.
+
+    `control` is of `CONTROL_ROW`, `target` of `TARGET`.
+    """
+    planned = 0.5 * control.subject.scale.length * target.stride_length
+    return abs(length - planned) / planned
+
+
+@part
+def remember(rows, controls, bodies, table, options, running) -> None:
+    """Write mean speed, joint velocities, phase and step length of the bodies `running` (N,) into `rows`, for the next
+    step's reward; the other arguments are as of `judge`."""
+    curves = np.empty((2, table.shape[-1]))
     for i in range(len(rows)):
         if running[i]:
             m = bodies[i].measured
             rows[i].mean_speed = _mean_speed(rows[i], m, options[0].seconds)
             rows[i].velocity[:] = m.velocity
+            phase = controls[i].legs.phase[LEFT]
+            if (phase < 0.5) != (rows[i].left_phase < 0.5):  # another leg leads: it has touched down
+                leader = LEFT if phase < 0.5 else RIGHT
+                length = m.ankle[leader, 0] - rows[i].landed
+                if rows[i].landed < np.inf:
+                    rows[i].step_error = _step_error(
+                        controls[i], targets_at(table, controls[i], curves)[leader], length
+                    )
+                rows[i].landed = m.ankle[leader, 0]
+            rows[i].left_phase = phase
 
 
 _charged_calf_stiffness = part(charged_calf_stiffness)
@@ -226,7 +248,8 @@ def judge(rows, controls, bodies, table, options, forces, terms) -> None:
     last step [body weights] x `ACTIVATION_TIME` over the time of a step. `speed_held`, distance of the CoM's mean speed
     (`HELD_SECONDS`) from the commanded one, over that; it does not saturate. `person_rate`, squared change of the
     offsets of rest angles in 20 ms, over `OFFSET_UNIT`, all six together. `acceleration`, sum over joints of the
-    squared mean acceleration in the step x `ACTIVATION_TIME` squared [rad^2].
+    squared mean acceleration in the step x `ACTIVATION_TIME` squared [rad^2]. `step_length`, distance of the length
+    of the last step, from touchdown to touchdown of the ankles, from the planned one, over that.
 
     Args:
         rows: (N,) of `TASK_ROW`.
@@ -270,6 +293,7 @@ def judge(rows, controls, bodies, table, options, forces, terms) -> None:
         terms[i, FIBRE_WORK] = muscles.energy.sum() / (scale.weight * way)
         terms[i, ACTIVATION] = muscles.activation / options[0].seconds
         terms[i, IMPACT] = _impact(rows[i], forces, i, options[0].seconds)
+        terms[i, STEP] = rows[i].step_error
         terms[i, SPEED_HELD] = terms[i, PERSON_RATE] = terms[i, SMOOTHNESS] = 0.0
         if terms[i, ALIVE] > 0.0:  # a body that diverged has no speeds
             held_speed = _mean_speed(rows[i], m, options[0].seconds)
@@ -353,6 +377,9 @@ class Task:
         self.rows["force"][ids] = 0.0
         self.rows["mean_speed"][ids] = self._subjects.speed[ids]
         self.rows["velocity"][ids] = velocity[ids]
+        self.rows["left_phase"][ids] = self._subjects.rows["legs"]["phase"][ids, LEFT]
+        self.rows["landed"][ids] = np.inf
+        self.rows["step_error"][ids] = 0.0
 
     def observe(self, bodies: NDArray, entries: int | None = None) -> NDArray:
         """Return the observation, float32 (N, D), clipped to its bounds: the settings' entries, or the first `entries`

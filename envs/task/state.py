@@ -27,6 +27,9 @@ TASK_ROW = np.dtype(
         ("worn", float, WORN),  # of the observation: what the person knows of body and feet
         ("mean_speed", float),  # of the CoM, over `HELD_SECONDS` before the last step [m/s]
         ("velocity", float, (len(SIDES), len(JOINTS))),  # of the joints at the last step's end [rad/s]
+        ("left_phase", float),  # stride phase of the left leg at the last step's end
+        ("landed", float),  # x of the ankle at the last touchdown [m], infinite before the first
+        ("step_error", float),  # of the length of the last step, over the planned one; 0 before there is one
         ("push", PUSH),
         ("ground", GROUND_STATE),
         ("noise", float, len(OBSERVATION)),  # on the observation, in its own units

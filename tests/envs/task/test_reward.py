@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from planned_body import Setup, leg_phases
 
+from springfoot.envs.batch.biped_batch import Biped
+from springfoot.envs.batch.walk import walked_steps
 from springfoot.envs.physics.measurement import Measurement
 from springfoot.envs.physics.model import ANKLE, HIP, KNEE, LEFT, RIGHT, TOE
 from springfoot.envs.settings.settings import DEFAULT_WEIGHTS, BipedSettings
@@ -13,6 +15,7 @@ from springfoot.envs.task.reward import (
 )
 from springfoot.errors import SpringfootError
 from springfoot.gait.body.body import GRAVITY
+from springfoot.gait.plan import plan_walk
 
 
 @pytest.fixture(scope="module")
@@ -245,3 +248,33 @@ def test_a_batch_gives_the_same_bits_as_its_members_alone(thesis_body):
 def test_an_unknown_reward_term_is_refused():
     with pytest.raises(SpringfootError, match="valid: alive, speed"):
         BipedSettings(reward_weights={"walk": 1.0})
+
+
+def test_held_speed_and_step_length_are_those_of_the_walk():
+    """Of two bodies at tabulated speeds, from what is measured at each step's end."""
+    height = np.array([1.5, 1.9])
+    commanded = np.array([0.9, 1.3]) * np.sqrt(height / 1.7)
+    ranges = {"height_range": (1.5, 1.9), "speed_range": (0.8, 1.5)}
+    biped = Biped(BipedSettings(**ranges, action_mode="residual", episode_seconds=4.0), 2)
+    biped.reset(np.arange(2), [0, 1], given={"height": height, "speed": commanded})
+    leads, ankles, speeds, told = [], [], [], []
+    for _, result in walked_steps(biped, lambda _: np.zeros((2, 4))):
+        leads.append((biped.leg_phase >= 0.5).argmin(-1))
+        ankles.append(biped.measurement.ankle[..., 0].copy())
+        speeds.append(biped.measurement.com_velocity[:, 0].copy())
+        told.append([result.info[f"reward/{name}"].copy() for name in ("speed_held", "step_length")])
+    for body in range(2):
+        lead = np.array(leads)[:, body]
+        landed = np.flatnonzero(np.diff(lead)) + 1
+        length = np.diff([ankles[step][body, lead[step]] for step in landed])
+        planned = plan_walk(biped.subjects.bodies[body], commanded[body]).step_length
+        expected = np.zeros(len(lead))
+        for begins, error in zip(landed[1:], np.abs(length / planned - 1.0), strict=True):
+            expected[begins + 1 :] = error  # a step is judged before its touchdown is remembered
+        assert len(length) > 4
+        np.testing.assert_allclose(np.array(told)[:, 1, body], expected, rtol=1e-9)
+        mean, held = commanded[body], []
+        for speed in np.array(speeds)[:, body]:
+            mean += 0.02 / 0.7 * (speed - mean)
+            held.append(abs(mean / commanded[body] - 1.0))
+        np.testing.assert_allclose(np.array(told)[:, 0, body], held, rtol=1e-9)
