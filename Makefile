@@ -31,7 +31,7 @@ help:
 	@echo "make docs     build the site in build/site; a warning is an error"
 	@echo "make format   apply the format and the lint fixes"
 	@echo "make bench    cost of a step against MuJoCo's own, and of training; figures in build/bench.json"
-	@echo "make benchmark  springs and our PPO, five seeds, on every frozen task, submitted and judged; hours; goes on after a stop"
+	@echo "make benchmark  springs and our PPO, five seeds, on the tasks that set stiffness, submitted and judged; hours; goes on after a stop"
 	@echo "make install  only $(VENV), from requirements.lock; the others do it by themselves"
 	@echo "make lock     requirements.lock anew: the versions of constraints.txt with the hash of every file"
 	@echo "make predict  a walk from nothing: plan, leg constants, policy; goes on after a stop"

@@ -1,4 +1,4 @@
-"""Springs that learn nothing, and our PPO, as submissions to every frozen task: rows for the leaderboard.
+"""Springs that learn nothing, and our PPO, as submissions to the frozen tasks that set stiffness, for the leaderboard.
 
     make benchmark
 
@@ -17,6 +17,7 @@ from springfoot.agents.training import Engine, train_missing
 from springfoot.agents.training.config import task_training
 from springfoot.agents.training.returns import evaluate_returns
 from springfoot.envs import Biped
+from springfoot.errors import SpringfootError, require_count
 from springfoot.evaluation.benchmark.submission import JUDGED, SUBMISSION, judge_submission, read_submission, submit
 from springfoot.evaluation.benchmark.task_walks import settings_of_task
 from springfoot.tasks import STIFFNESS_TASKS, VERSION
@@ -45,28 +46,34 @@ def submit_and_judge(policy: str, task: str, name: str, folder: Path) -> None:
         submit(policy, task, name, folder, threads=2)
     if not (folder / JUDGED).exists():
         found = judge_submission(read_submission(folder), threads=2)
+        if not found.passes:
+            sys.exit(f"{folder} does not repeat its numbers: {found.repeated.summary}")
         print(f"{task}, {name}: {found.repeated.summary}; drawn: {found.drawn.summary}", flush=True)
 
 
 def main() -> None:
-    """Submit springs to every task, then PPO of some seeds."""
+    """Submit springs to each task, then PPO of some seeds."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seeds", type=int, default=5, help="trainings of each task (default: 5)")
     parser.add_argument("--timesteps", type=int, default=500_000, help="of each training (default: 500,000)")
     parser.add_argument("--engine", choices=get_args(Engine), default="here", help="where to train (default: here)")
     flags = parser.parse_args()
     tasks = [f"{name}-{VERSION}" for name in STIFFNESS_TASKS]
+    runs = [(task, seed, f"ppo-{flags.timesteps}-seed-{seed}") for seed in range(flags.seeds) for task in tasks]
+    try:
+        require_count("seeds", flags.seeds, 0)
+        jobs = [
+            (replace(task_training(task), seed=seed, timesteps=flags.timesteps), RUNS / task / label, f"{task} {label}")
+            for task, seed, label in runs
+        ]
+    except SpringfootError as error:
+        parser.error(str(error))
     for task in tasks:
         for policy in ("random", "schedule"):
             submit_and_judge(policy, task, policy, SUBMISSIONS / task / policy)
         if not (SUBMISSIONS / task / "constant" / JUDGED).exists():
             springs = best_constant(task)
             submit_and_judge(springs, task, f"best {springs}", SUBMISSIONS / task / "constant")
-    runs = [(task, seed, f"ppo-{flags.timesteps}-seed-{seed}") for seed in range(flags.seeds) for task in tasks]
-    jobs = [
-        (replace(task_training(task), seed=seed, timesteps=flags.timesteps), RUNS / task / label, f"{task} {label}")
-        for task, seed, label in runs
-    ]
     if train_missing(jobs, flags.engine) != "finished":
         sys.exit("a training failed or was stopped; the same command goes on")
     for task, seed, label in runs:

@@ -1,5 +1,6 @@
 """Define the command that judges submissions to the benchmark: `springfoot judge`."""
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -40,14 +41,17 @@ def run_judge(flags: JudgeFlags) -> int:
         judge_submission,
         read_submission,
     )  # help needs no simulator
+    from springfoot.evaluation.benchmark.task_walks import policy_on_task
     from springfoot.files.writing import is_taken
 
     require_count("threads", flags.threads, 1, MOST_THREADS)
     if not flags.folders:
         raise SpringfootError("name one or more folders of springfoot submit")
-    if len({folder.resolve() for folder in flags.folders}) < len(flags.folders):
+    if len({os.path.realpath(folder) for folder in flags.folders}) < len(flags.folders):
         raise SpringfootError("name each folder once")
-    submissions = [read_submission(folder) for folder in flags.folders]  # all are read before the first walks
+    submissions = [read_submission(folder) for folder in flags.folders]
+    for each in submissions:  # all are read before the first walks
+        policy_on_task(each.policy, each.task)
     if judged := [folder for folder in flags.folders if is_taken(folder / JUDGED)]:
         raise SpringfootError(f"{judged[0]} was judged before: remove its {JUDGED} to judge it again")
     end_in_order()

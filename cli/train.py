@@ -16,7 +16,7 @@ from springfoot.errors import MOST_THREADS, SpringfootError, require_count
 from springfoot.extras import naming_extras
 from springfoot.files.writing import require_new
 from springfoot.studies.base.flags import given, optional_flags
-from springfoot.tasks import MUST_AGREE
+from springfoot.tasks import MAY_NAME_FILES, MUST_AGREE
 
 PRESET = PRESETS["walk"]
 """Preset whose values the help shows as defaults."""
@@ -95,8 +95,8 @@ def run_training(flags: TrainFlags) -> int:
             raise SpringfootError(f"{error}{hint}") from None
     if flags.task is not None and (flags.resume or flags.preset != "walk"):
         raise SpringfootError("--task begins a training with its own preset; drop --resume or --preset")
-    if flags.task is not None and (changed := [name for name in MUST_AGREE if name in settings]):
-        raise SpringfootError(f"--task decides what an action means; drop --{changed[0].replace('_', '-')}")
+    if flags.task is not None and (changed := [name for name in (*MUST_AGREE, *MAY_NAME_FILES) if name in settings]):
+        raise SpringfootError(f"--task does not leave {changed[0]} open; drop --{changed[0].replace('_', '-')}")
     if flags.num_env_runners is not None:
         if flags.engine != "rllib" and flags.out is not None:
             raise SpringfootError("--num-env-runners is of --engine rllib; give that, or drop it")

@@ -1,8 +1,9 @@
 """Define the frozen tasks of the benchmark; `import springfoot` registers each with Gymnasium.
 
 Each task has two ids: `springfoot/Walk-v0`, where the action is the stiffness of ankles and toes and the committed
-person `learned` walks, and `springfoot/WalkBoth-v0`, where the action also moves hips, knees and ankles. New settings,
-another person or other physics make a new version. Until springfoot 0.1.0 is released, v0 may change.
+person `learned` walks (in `FromThePlan` the tuned rest angles do), and `springfoot/WalkBoth-v0`, where the action also
+moves hips, knees and ankles. New settings, another person or other physics make a new version. Until springfoot 0.1.0
+is released, v0 may change.
 """
 
 from typing import Any
@@ -24,6 +25,8 @@ MUST_AGREE = (
     "person_range_deg",
 )
 """Settings that give an action its meaning: a policy trained with others is refused."""
+MAY_NAME_FILES = ("people_file", "plan_file", "person")
+"""Settings that may name a file, which a submission does not hold: a policy trained with one is refused."""
 _PUSHES = {"push_newton": 100.0}
 _WEAK_CALF = {"kind": "weak", "strength": 0.3}
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from springfoot.errors import SpringfootError, require_number
+from springfoot.errors import SpringfootError, require_count, require_number
 from springfoot.files.json_file import read_object
 from springfoot.files.markdown import table
 from springfoot.tasks import TASKS
@@ -13,7 +13,6 @@ from .task_walks import EPISODES
 
 MOST_ROWS = 8
 """Most rows of a task's table; chosen, a table that is read."""
-_NUMBERS = ("return_mean", "falls", "drawn_return_mean", "drawn_falls")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,26 +41,29 @@ def judged_rows(folder: Path) -> list[JudgedRow]:
     """Return the judged submissions anywhere below a folder, the highest public return first; those of equal return by
     name.
 
-    Raises `SpringfootError` for a bad submission, and for a judgement that is damaged, of another policy, or without a
-    number. A judgement is trusted: who keeps the folder makes it, by `springfoot judge`.
+    Raises `SpringfootError` for a bad submission, and for a judgement that is damaged, of another policy or task, or
+    with impossible numbers. A judgement is trusted: who keeps the folder makes it, by `springfoot judge`.
     """
     rows = []
     for path in sorted(folder.rglob(JUDGED)):
         submission = read_submission(path.parent)
         judged = read_object(path, "judgement")
-        if judged.get("policy_digest") != submission.digest:
-            raise SpringfootError(f"{path} judges another policy than {path.parent} submits")
+        if (judged.get("policy_digest"), judged.get("task")) != (submission.digest, submission.task):
+            raise SpringfootError(f"{path} judges another policy or task than {path.parent} submits")
         try:
-            numbers = {name: require_number(name, judged[name], -LARGEST_RETURN, LARGEST_RETURN) for name in _NUMBERS}
+            for name in ("return_mean", "drawn_return_mean"):
+                require_number(name, judged[name], -LARGEST_RETURN, LARGEST_RETURN)
+            for name in ("falls", "drawn_falls"):
+                require_count(name, judged[name], 0, EPISODES)
         except (KeyError, SpringfootError):
-            raise SpringfootError(f"{path} is no judgement: it needs the numbers {', '.join(_NUMBERS)}") from None
+            raise SpringfootError(f"{path} is no judgement: its returns or falls are missing or impossible") from None
         rows.append(
             JudgedRow(
                 submission=submission,
-                return_mean=numbers["return_mean"],
-                falls=int(numbers["falls"]),
-                drawn_return_mean=numbers["drawn_return_mean"],
-                drawn_falls=int(numbers["drawn_falls"]),
+                return_mean=judged["return_mean"],
+                falls=judged["falls"],
+                drawn_return_mean=judged["drawn_return_mean"],
+                drawn_falls=judged["drawn_falls"],
             )
         )
     return sorted(rows, key=lambda row: (-row.return_mean, row.submission.name))
@@ -77,5 +79,5 @@ def leaderboard(folder: Path) -> str:
         if of_task:
             parts.append(f"## {task}\n\n{table(head, of_task[:MOST_ROWS])}")
             if len(of_task) > MOST_ROWS:
-                parts.append(f"{len(of_task) - MOST_ROWS} more are below these.")
+                parts.append(f"{len(of_task) - MOST_ROWS} more are not shown.")
     return "\n\n".join(parts)

@@ -19,7 +19,15 @@ from springfoot.files.provenance import versions_and_commit
 from springfoot.files.text_table import read_bytes
 from springfoot.files.writing import require_new_files, whole_folder, write_new
 
-from .task_walks import EPISODES, TaskWalks, is_baseline, settings_of_task, walk_drawn_from, walk_publicly
+from .task_walks import (
+    EPISODES,
+    TaskWalks,
+    is_baseline,
+    policy_on_task,
+    settings_of_task,
+    walk_drawn_from,
+    walk_publicly,
+)
 
 SUBMISSION, POLICY, JUDGED = "submission.json", "policy.safetensors", "judged.json"
 """Files of a submission's folder."""
@@ -31,7 +39,7 @@ SAME = 1e-6
 """Largest relative difference of a return that counts as the same on another processor [-]; chosen."""
 LARGEST_RETURN = 1e6
 """Largest magnitude of an episode's return [-]; chosen, a hundred times the highest that weights allow."""
-_NAME = re.compile(r"[\w ,.:()+-]+")
+_NAME = re.compile(r"(?:[^\W_]|[ ,.:()+-])+")
 """Letters of a submission's name: none that Markdown or HTML reads."""
 _PACKAGES = ("springfoot", "mujoco", "numpy", "gymnasium")
 
@@ -73,6 +81,7 @@ def submit(policy: str, task: str, name: str, out: Path | None, threads: int) ->
     """
     settings_of_task(task)  # an unknown task first
     _require_name(name)
+    policy_on_task(policy, task)  # one that the task does not take
     content = None if is_baseline(policy) else read_bytes(find_policy(policy), MOST_POLICY_BYTES)
     digest = sha256(policy.encode() if content is None else content).hexdigest()
     walks = walk_publicly(policy, task, threads)
@@ -102,14 +111,17 @@ def read_submission(folder: Path) -> Submission:
     try:
         name, task, policy, digest = (str(values[key]) for key in ("name", "task", "policy", "policy_digest"))
         returns = np.array(values["returns"], float)
-        fell = np.array(values["fell"], bool)
+        falls = list(values["fell"])
     except (KeyError, TypeError, ValueError, OverflowError) as error:
         fault = f"has no {error}" if isinstance(error, KeyError) else f"has no numbers where it should: {error}"
         raise SpringfootError(f"{path} is no submission: it {printable(fault)}") from None
-    _require_name(name)
-    settings_of_task(task)
-    if returns.shape != (EPISODES,) or fell.shape != (EPISODES,):
-        raise SpringfootError(f"{path} is no submission: it needs {EPISODES} returns and falls")
+    try:
+        _require_name(name)
+        settings_of_task(task)
+    except SpringfootError as error:
+        raise SpringfootError(f"{path} is no submission: {error}") from None
+    if returns.shape != (EPISODES,) or len(falls) != EPISODES or any(fell not in (0, 1) for fell in falls):
+        raise SpringfootError(f"{path} is no submission: it needs {EPISODES} returns, and falls of 0 or 1")
     if not np.all(np.abs(returns) <= LARGEST_RETURN):
         raise SpringfootError(f"{path} is no submission: a return must be within ±{LARGEST_RETURN:g}")
     if policy == POLICY:
@@ -121,7 +133,7 @@ def read_submission(folder: Path) -> Submission:
         raise SpringfootError(f"{path} names the policy {quoted(policy)}: allowed are {POLICY} and baselines")
     if found != digest:
         raise SpringfootError(f"{policy} is not the policy that was submitted: its SHA-256 is {found[:12]}…")
-    walks = TaskWalks(returns=returns, fell=fell)
+    walks = TaskWalks(returns=returns, fell=np.array(falls, bool))
     return Submission(folder=folder, name=name, task=task, policy=policy, digest=digest, walks=walks)
 
 
@@ -140,6 +152,7 @@ def judge_submission(submission: Submission, threads: int) -> Judgement:
     passes = bool(near and np.array_equal(repeated.fell, told.fell))
     if passes:
         values: dict[str, Any] = {
+            "task": submission.task,
             "policy_digest": submission.digest,
             "same_bits": same_bits,
             "return_mean": float(repeated.returns.mean()),

@@ -1,29 +1,32 @@
 """Walk a policy on a frozen task: its returns on public seeds, and on seeds and bodies drawn from its digest."""
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
 from springfoot.agents import PolicyFunction, baseline, read_policy
 from springfoot.agents.policies.baselines import BASELINES, own_settings
+from springfoot.agents.policies.policy import SHIPPED
 from springfoot.agents.training.returns import evaluate_returns
 from springfoot.arrays import NDArray
 from springfoot.envs.batch.biped_batch import Biped
+from springfoot.envs.batch.learned_person import LEARNED
 from springfoot.envs.settings.settings import BipedSettings, settings_from, settings_to_json
 from springfoot.errors import SpringfootError, quoted, require_choice
-from springfoot.tasks import HOW_IT_ACTS, MUST_AGREE, TASKS
+from springfoot.tasks import HOW_IT_ACTS, MAY_NAME_FILES, MUST_AGREE, TASKS
 
 EPISODES = 100
 """Episodes of a task, public or drawn."""
 PUBLIC_SEED = 70_000_000
-"""Seed of the first public episode; the following count on. Trainings use others."""
+"""Seed of the first public episode; the following count on. No training has them unless it chooses them."""
 DRAWN_HEIGHTS, DRAWN_MASSES = (1.55, 1.85), (50.0, 85.0)
 """Ranges of the drawn bodies [m], [kg], where the task itself draws none; chosen, most adults."""
 
+_NO_FILES = (None, "tuned", *LEARNED)
+"""Values of the settings `MAY_NAME_FILES` that name no file, or one of the package."""
 _FINGERPRINT_EPISODES, _FINGERPRINT_ACTION = 8, 0.3
 """Episodes of a fingerprint, and the largest of their random actions [-]; chosen, a second's work."""
-_FILES = ("people_file", "plan_file")
-"""Settings that name a file: a policy trained with one cannot be read without it."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -85,8 +88,13 @@ def policy_on_task(policy: str, task: str) -> tuple[PolicyFunction, BipedSetting
             )
         settings = replace(settings, **own)
         return baseline(policy, settings), settings
+    if policy not in SHIPPED and not Path(policy).exists():
+        raise SpringfootError(
+            f"no policy {policy}: a submission is a .safetensors file, a run folder, one of {', '.join(SHIPPED)}, or a "
+            f"baseline, {', '.join(BASELINES)}"
+        )
     read = read_policy(policy)
-    if named := [name for name in _FILES if getattr(read.settings, name) is not None]:
+    if named := [name for name in MAY_NAME_FILES if getattr(read.settings, name) not in _NO_FILES]:
         raise SpringfootError(f"{policy} needs a file, its {named[0]}, which a submission does not hold")
     known, needed = settings_to_json(read.settings), settings_to_json(settings)
     for name in MUST_AGREE:
@@ -109,9 +117,15 @@ def walk_drawn_from(digest: str, policy: str, task: str, threads: int) -> TaskWa
     The seeds change with any change of the policy, so that a training cannot know them.
     """
     act, settings = policy_on_task(policy, task)
-    if settings.height_range is None:
-        settings = replace(settings, height_range=DRAWN_HEIGHTS, mass_range=DRAWN_MASSES)
-    return _walk(act, settings, int(digest[:8], 16), threads)
+    return _walk(act, with_drawn_bodies(settings), int(digest[:8], 16), threads)
+
+
+def with_drawn_bodies(settings: BipedSettings) -> BipedSettings:
+    """Return the settings with bodies drawn from `DRAWN_HEIGHTS` and `DRAWN_MASSES`, unless they draw bodies
+    themselves."""
+    if settings.height_range is not None:
+        return settings
+    return replace(settings, height_range=DRAWN_HEIGHTS, mass_range=DRAWN_MASSES)
 
 
 def _walk(act: PolicyFunction, settings: BipedSettings, seed: int, threads: int) -> TaskWalks:

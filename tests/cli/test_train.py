@@ -122,7 +122,8 @@ def test_a_task_takes_no_preset_and_no_other_action(tmp_path, capsys):
     words = ["--task", "Walk-v0", "--out", str(tmp_path / "run")]
     for more, message in (
         (["--preset", "person"], "--task begins a training with its own preset; drop --resume or --preset"),
-        (["--decisions", "event"], "--task decides what an action means; drop --decisions"),
+        (["--decisions", "event"], "--task does not leave decisions open; drop --decisions"),
+        (["--people-file", "people.json"], "--task does not leave people_file open; drop --people-file"),
     ):
         assert train_command.train_main([*words, *more]) == 2
         assert capsys.readouterr().err == f"train.py: error: {message}\n"

@@ -10,13 +10,21 @@ import pytest
 
 from springfoot.agents import read_policy, save_policy
 from springfoot.agents.policies.fingerprint import fingerprint
+from springfoot.agents.training.config import PRESETS, task_training
 from springfoot.cli.judge import judge_main
 from springfoot.cli.main import main
 from springfoot.envs import Biped
+from springfoot.envs.batch.learned_person import person_file
 from springfoot.errors import SpringfootError
 from springfoot.evaluation.benchmark import submission as benchmark
 from springfoot.evaluation.benchmark.leaderboard import judged_rows, leaderboard
-from springfoot.evaluation.benchmark.task_walks import policy_on_task, walk_drawn_from, walk_publicly
+from springfoot.evaluation.benchmark.task_walks import (
+    policy_on_task,
+    settings_of_task,
+    walk_drawn_from,
+    walk_publicly,
+    with_drawn_bodies,
+)
 from springfoot.files.json_file import object_with_digest, read_object
 
 REPOSITORY = Path(__file__).parents[3]
@@ -59,7 +67,7 @@ def test_a_submission_is_judged_to_the_same_bits_on_any_number_of_threads(submit
     assert main(["judge", str(folders[0])]) == 2  # judged before
     other = {**judged["ours"], "policy_digest": "0" * 64}
     (folders[0] / benchmark.JUDGED).write_bytes(object_with_digest(other))
-    with pytest.raises(SpringfootError, match="judges another policy than"):
+    with pytest.raises(SpringfootError, match="judges another policy or task than"):
         judged_rows(tmp_path)
 
 
@@ -75,6 +83,8 @@ def test_the_task_decides_every_setting_but_the_action_mode(tmp_path):
 @pytest.mark.parametrize(
     ("setting", "value"),
     [
+        ("toe_stiffness_range", (5.0, 100.0)),
+        ("person_range_deg", 20.0),
         ("guide", "plan"),
         ("decisions", "event"),
         ("decisions", "100hz"),
@@ -92,12 +102,38 @@ def test_a_policy_whose_action_means_something_else_is_refused(setting, value, t
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("task", ["Slopes-v0", "Prosthesis-v0"])
-def test_a_committed_submission_repeats(task):
-    submission = benchmark.read_submission(REPOSITORY / "benchmarks" / "submissions" / task / "constant")
-    repeated = walk_publicly(submission.policy, task, threads=1)
-    assert repeated.returns.mean() == pytest.approx(submission.walks.returns.mean(), rel=benchmark.SAME)
+def test_a_committed_submission_repeats():
+    folder = REPOSITORY / "benchmarks" / "submissions" / "Slopes-v0" / "constant"
+    submission = benchmark.read_submission(folder)
+    judged = read_object(folder / benchmark.JUDGED, "judgement")
+    repeated = walk_publicly(submission.policy, submission.task, threads=1)
+    assert repeated.returns == pytest.approx(submission.walks.returns, rel=benchmark.SAME)
     assert np.array_equal(repeated.fell, submission.walks.fell)
+    drawn = walk_drawn_from(submission.digest, submission.policy, submission.task, threads=1)
+    assert judged["drawn_return_mean"] == pytest.approx(drawn.returns.mean(), rel=benchmark.SAME)
+    assert judged["drawn_falls"] == drawn.fell.sum()
+
+
+def test_every_committed_judgement_is_of_its_submission_and_of_a_commit():
+    rows = judged_rows(REPOSITORY / "benchmarks" / "submissions")
+    assert len(rows) >= 21
+    for row in rows:
+        judged = read_object(row.submission.folder / benchmark.JUDGED, "judgement")
+        assert row.return_mean == pytest.approx(row.submission.walks.returns.mean(), rel=benchmark.SAME)
+        assert row.falls == row.submission.walks.fell.sum()
+        assert judged["made_with"]["modified"] is False
+
+
+def test_a_policy_with_a_file_of_its_own_is_refused(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "me.safetensors").write_bytes(person_file("learned-2").read_bytes())
+    policy = read_policy("pretrained")
+    settings = replace(policy.settings, person="me.safetensors")
+    save_policy(
+        tmp_path / "policy.safetensors", replace(policy, settings=settings, fingerprint=fingerprint(Biped(settings, 1)))
+    )
+    with pytest.raises(SpringfootError, match="needs a file, its person, which a submission does not hold"):
+        policy_on_task("policy.safetensors", TASK)
 
 
 @pytest.mark.parametrize("forged", ["one return", "order", "falls"])
@@ -139,8 +175,8 @@ def test_a_changed_number_is_refused(submitted, tmp_path):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"task": "Fly-v0"}, "task must be one of"),
-        ({"returns": [1.0]}, "it needs 100 returns and falls"),
+        ({"task": "Fly-v0"}, "bad/submission.json is no submission: task must be one of"),
+        ({"returns": [1.0]}, "it needs 100 returns, and falls of 0 or 1"),
         ({"returns": [1e308] * 100}, "a return must be within"),
         ({"name": "<script>"}, "name must be 1 to 60 letters"),
         ({"returns": "many"}, "has no numbers where it should"),
@@ -148,6 +184,9 @@ def test_a_changed_number_is_refused(submitted, tmp_path):
         ({"policy": "os:system"}, "allowed are policy.safetensors and baselines"),
         ({"policy": "constant:1,2"}, "is not the policy that was submitted"),
         ({"name": "a|b"}, "name must be 1 to 60 letters"),
+        ({"name": "*a*"}, "bad/submission.json is no submission: name must be 1 to 60 letters"),
+        ({"name": "_a_"}, "name must be 1 to 60 letters"),
+        ({"fell": ["a"] * 100}, "it needs 100 returns, and falls of 0 or 1"),
     ],
 )
 def test_a_bad_submission_is_one_line(submitted, tmp_path, change, message):
@@ -168,7 +207,10 @@ def test_a_bad_submission_is_one_line(submitted, tmp_path, change, message):
             "pretrained was trained with acts 'stiffness', WalkBoth-v0 takes 'both'",
         ),
         (["thesis", "--task", TASK], "thesis needs action_mode, equilibrium, schedule of its own"),
-        (["nobody", "--task", TASK], "no policy nobody"),
+        (
+            ["nobody", "--task", TASK],
+            "no policy nobody: a submission is a .safetensors file, a run folder, one of pretrained",
+        ),
         (["schedule", "--task", "Walk"], "task must be one of 'Walk-v0'"),
         (["schedule", "--task", TASK, "--out", "."], ". exists already: out must be a new folder"),
     ],
@@ -180,11 +222,79 @@ def test_a_policy_that_a_task_does_not_take_is_refused(words, message, tmp_path,
     assert list(tmp_path.iterdir()) == []
 
 
+def test_bodies_are_drawn_unless_the_task_draws_its_own():
+    assert with_drawn_bodies(settings_of_task("AnyBody-v0")) == settings_of_task("AnyBody-v0")
+    drawn = with_drawn_bodies(settings_of_task(TASK))
+    assert (drawn.height_range, drawn.mass_range) == ((1.55, 1.85), (50.0, 85.0))
+    assert replace(drawn, height_range=None, mass_range=None) == settings_of_task(TASK)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"falls": 101}, "its returns or falls are missing or impossible"),
+        ({"drawn_falls": -1}, "its returns or falls are missing or impossible"),
+        ({"drawn_return_mean": None}, "its returns or falls are missing or impossible"),
+        ({"task": "FromThePlan-v0"}, "judges another policy or task than"),
+    ],
+)
+def test_a_judgement_that_cannot_be_is_refused(submitted, tmp_path, change, message):
+    folder = copied(submitted[1], tmp_path / "judged")
+    (folder / benchmark.JUDGED).write_bytes(object_with_digest(a_judgement(submitted[1]) | change))
+    with pytest.raises(SpringfootError, match=message):
+        judged_rows(tmp_path)
+
+
+def a_judgement(submission):
+    """The values of a judgement that repeats a submission."""
+    numbers = {"return_mean": 1.0, "falls": 0, "drawn_return_mean": 2.0, "drawn_falls": 0}
+    return {"task": submission.task, "policy_digest": submission.digest, **numbers}
+
+
+def test_a_table_has_eight_rows_and_says_how_many_more_there_are(submitted, tmp_path):
+    for name in "abcdefghij":
+        folder = copied(submitted[1], tmp_path / name)
+        values = read_object(folder / benchmark.SUBMISSION, "submission") | {"name": name}
+        (folder / benchmark.SUBMISSION).write_bytes(object_with_digest(values))
+        (folder / benchmark.JUDGED).write_bytes(object_with_digest(a_judgement(submitted[1])))
+    board = leaderboard(tmp_path)
+    assert "\n| h |" in board
+    assert "\n| i |" not in board
+    assert board.endswith("2 more are not shown.")
+
+
+def test_judge_refuses_before_it_walks(submitted, tmp_path, capsys):
+    good, bad = copied(submitted[1], tmp_path / "good"), copied(submitted[0], tmp_path / "bad")
+    (bad / benchmark.POLICY).write_bytes(b"no policy")
+    digest = sha256(b"no policy").hexdigest()
+    values = read_object(bad / benchmark.SUBMISSION, "submission") | {"policy_digest": digest}
+    (bad / benchmark.SUBMISSION).write_bytes(object_with_digest(values))
+    (tmp_path / "loop").symlink_to("loop")
+    for words, message in (
+        ([good, bad], "policy.safetensors"),
+        ([good, tmp_path / "." / "good"], "name each folder once"),
+        ([tmp_path / "loop"], "loop"),
+    ):
+        assert judge_main([str(word) for word in words]) == 2
+        error = capsys.readouterr().err
+        assert message in error
+        assert error.count("\n") == 1
+    assert not (good / benchmark.JUDGED).exists()
+
+
 def test_the_drawn_episodes_follow_from_the_digest():
     one, again, other = (
-        walk_drawn_from(digest * 8, "schedule", TASK, 1) for digest in ("0123abcd", "0123abcd", "f123abcd")
+        walk_drawn_from(digest * 8, "schedule", TASK, 1) for digest in ("0123abcd", "0123abcd", "0123abce")
     )
     assert np.array_equal(one.returns, again.returns)
     assert not np.array_equal(one.returns, other.returns)
     same_body = walk_publicly("schedule", TASK, 1)
     assert one.returns.std() > 1.5 * same_body.returns.std()  # bodies differ, too
+
+
+def test_a_task_s_training_is_on_its_settings_and_with_a_person_s_network_where_the_person_acts():
+    stiffness, both = task_training(TASK), task_training("WalkBoth-v0")
+    assert stiffness == replace(PRESETS["walk"], environment=settings_of_task(TASK))
+    person = PRESETS["person"]
+    assert both.environment == replace(settings_of_task("WalkBoth-v0"), action_mode=person.environment.action_mode)
+    assert (both.mirrored, both.hidden, both.log_std) == (True, person.hidden, person.log_std)
