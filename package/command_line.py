@@ -109,6 +109,9 @@ def _message_in_box(text: str) -> str:
     if not text.startswith("╭"):  # where there is no UTF-8, the title is above a line of its own
         parts = parts[1:] or parts
     message = " ".join(parts[0].split())
+    if message.startswith("Missing from "):  # then each missing argument, indented, with its help further in
+        needed = re.findall(r"^[│ ] {5}(\S.*?) *│?$", text, re.MULTILINE)
+        return f"give {' and '.join(words.strip() for words in needed if '--help' not in words)}; --help tells more"
     for pattern, wording in _REWORDED.items():
         message = re.sub(pattern, wording, message)
     # As the rest of a line: a small first letter, no full stop; an ellipsis stays.

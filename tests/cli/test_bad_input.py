@@ -274,6 +274,19 @@ def test_bad_input_of_a_command_is_one_printable_line_and_exit_code_2(monkeypatc
     assert message.isprintable() and not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ([], "give POLICY and --task TASK; --help tells more"),
+        (["schedule"], "give --task TASK; --help tells more"),
+    ],
+)
+def test_missing_arguments_are_named(capsys, words, message):
+    with pytest.raises(SystemExit, match=r"^2$"):
+        main(["submit", *words])
+    assert capsys.readouterr() == ("", f"springfoot submit: error: {message}\n")
+
+
 # Where a setting ends, rewards are still numbers ---------------------------------------------------------------
 
 

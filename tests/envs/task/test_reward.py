@@ -1,5 +1,7 @@
 """The reward against closed forms, the same bits for any N."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from planned_body import Setup, leg_phases
@@ -254,8 +256,8 @@ def test_held_speed_and_step_length_are_those_of_the_walk():
     """Of two bodies at tabulated speeds, from what is measured at each step's end."""
     height = np.array([1.5, 1.9])
     commanded = np.array([0.9, 1.3]) * np.sqrt(height / 1.7)
-    ranges = {"height_range": (1.5, 1.9), "speed_range": (0.8, 1.5)}
-    biped = Biped(BipedSettings(**ranges, action_mode="residual", episode_seconds=4.0), 2)
+    ranges = BipedSettings(height_range=(1.5, 1.9), speed_range=(0.8, 1.5), action_mode="residual")
+    biped = Biped(replace(ranges, episode_seconds=4.0), 2)
     biped.reset(np.arange(2), [0, 1], given={"height": height, "speed": commanded})
     leads, ankles, speeds, told = [], [], [], []
     for _, result in walked_steps(biped, lambda _: np.zeros((2, 4))):
