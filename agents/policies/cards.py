@@ -16,8 +16,8 @@ LEARNED_2_BY = "`, then `".join(
 )
 """Commands that made `learned-2` from `learned`."""
 LEARNED_3_BY = (
-    "springfoot train --preset person --begin-from learned`, then once more from what came of it, with the settings in "
-    "`docs/results/csv/learned_3.json"
+    "springfoot train --preset person --begin-from learned`, then three times more from what came of it, with the "
+    "settings in `docs/results/csv/learned_3.json"
 )
 """Commands that made `learned-3` from `learned`."""
 MADE = {
@@ -39,8 +39,9 @@ MADE = {
         "feet",
     ),
     "learned-3": (
-        "Went on from `learned` at four times its prices: falls least, lands softest; its knees are farther from "
-        "people's.",
+        "Went on from `learned` with most weights four to fifteen times as high, wider ranges and a price on the length "
+        "of steps: falls least, its knees are nearest to people's; at 0.9 and 1.2 m/s its forces are farther from "
+        "theirs.",
         LEARNED_3_BY,
         "feet",
     ),
