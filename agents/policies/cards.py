@@ -39,9 +39,9 @@ MADE = {
         "feet",
     ),
     "learned-3": (
-        "Went on from `learned` with most weights four to fifteen times as high, wider ranges and a price on the length "
-        "of steps: falls least, its knees are nearest to people's; at 0.9 and 1.2 m/s its forces are farther from "
-        "theirs.",
+        "Went on from `learned` with most weights four to fifteen times as high, on wider ranges and with a price on "
+        "the length of steps: falls least, its knees are nearest to people's; at 0.9 and 1.2 m/s its forces are "
+        "farther.",
         LEARNED_3_BY,
         "feet",
     ),

@@ -146,10 +146,8 @@ def judge_submission(submission: Submission, threads: int) -> Judgement:
     require_new_files([path])
     repeated = walk_publicly(submission.policy, submission.task, threads)
     drawn = walk_drawn_from(submission.digest, submission.policy, submission.task, threads)
-    told = submission.walks
-    same_bits = bool(np.array_equal(repeated.returns, told.returns) and np.array_equal(repeated.fell, told.fell))
-    near = np.allclose(repeated.returns, told.returns, rtol=SAME, atol=0.0)
-    passes = bool(near and np.array_equal(repeated.fell, told.fell))
+    passes = repeats(repeated, submission.walks, SAME)
+    same_bits = repeats(repeated, submission.walks, 0.0)
     if passes:
         values: dict[str, Any] = {
             "task": submission.task,
@@ -164,6 +162,12 @@ def judge_submission(submission: Submission, threads: int) -> Judgement:
         }
         write_new({path: object_with_digest(values)})
     return Judgement(repeated=repeated, drawn=drawn, same_bits=same_bits, passes=passes)
+
+
+def repeats(walks: TaskWalks, told: TaskWalks, within: float) -> bool:
+    """Return True if the same episodes fall in `walks` as `told`, and every return is `within` that, relative [-]."""
+    near = np.abs(walks.returns - told.returns) <= within * np.abs(told.returns)
+    return bool(near.all() and np.array_equal(walks.fell, told.fell))
 
 
 def _require_name(name: str) -> None:

@@ -117,7 +117,12 @@ def walk_drawn_from(digest: str, policy: str, task: str, threads: int) -> TaskWa
     The seeds change with any change of the policy, so that a training cannot know them.
     """
     act, settings = policy_on_task(policy, task)
-    return _walk(act, with_drawn_bodies(settings), int(digest[:8], 16), threads)
+    return _walk(act, with_drawn_bodies(settings), drawn_seed(digest), threads)
+
+
+def drawn_seed(digest: str) -> int:
+    """Return the seed of the first drawn episode of a policy with a SHA-256 `digest`."""
+    return int(digest[:8], 16)
 
 
 def with_drawn_bodies(settings: BipedSettings) -> BipedSettings:
