@@ -179,7 +179,7 @@ def _acceleration(row, m, seconds):
 
 @part
 def _step_error(control, target, length):
-    """Return the distance of a step's `length` [m] from the planned one, over that.
+    """Return the difference of a step's `length` [m] and the planned one, over that, without sign.
 
     `control` is of `CONTROL_ROW`, `target` of `TARGET`.
     """
@@ -200,11 +200,9 @@ def remember(rows, controls, bodies, table, options, running) -> None:
             phase = controls[i].legs.phase[LEFT]
             if (phase < 0.5) != (rows[i].left_phase < 0.5):  # another leg leads: it has touched down
                 leader = LEFT if phase < 0.5 else RIGHT
-                length = m.ankle[leader, 0] - rows[i].landed
                 if rows[i].landed < np.inf:
-                    rows[i].step_error = _step_error(
-                        controls[i], targets_at(table, controls[i], curves)[leader], length
-                    )
+                    target = targets_at(table, controls[i], curves)[leader]
+                    rows[i].step_error = _step_error(controls[i], target, m.ankle[leader, 0] - rows[i].landed)
                 rows[i].landed = m.ankle[leader, 0]
             rows[i].left_phase = phase
 
@@ -248,8 +246,8 @@ def judge(rows, controls, bodies, table, options, forces, terms) -> None:
     last step [body weights] x `ACTIVATION_TIME` over the time of a step. `speed_held`, distance of the CoM's mean speed
     (`HELD_SECONDS`) from the commanded one, over that; it does not saturate. `person_rate`, squared change of the
     offsets of rest angles in 20 ms, over `OFFSET_UNIT`, all six together. `acceleration`, sum over joints of the
-    squared mean acceleration in the step x `ACTIVATION_TIME` squared [rad^2]. `step_length`, distance of the length
-    of the last step, from touchdown to touchdown of the ankles, from the planned one, over that.
+    squared mean acceleration in the step x `ACTIVATION_TIME` squared [rad^2]. `step_length`, difference of the
+    last step's length, between the ankles as each foot touched down, and the planned one, over that.
 
     Args:
         rows: (N,) of `TASK_ROW`.

@@ -29,7 +29,7 @@ TASK_ROW = np.dtype(
         ("velocity", float, (len(SIDES), len(JOINTS))),  # of the joints at the last step's end [rad/s]
         ("left_phase", float),  # stride phase of the left leg at the last step's end
         ("landed", float),  # x of the ankle at the last touchdown [m], infinite before the first
-        ("step_error", float),  # of the length of the last step, over the planned one; 0 before there is one
+        ("step_error", float),  # difference of the last step's length and the planned one, over that; 0 before a step
         ("push", PUSH),
         ("ground", GROUND_STATE),
         ("noise", float, len(OBSERVATION)),  # on the observation, in its own units
