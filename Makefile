@@ -8,7 +8,8 @@ SHELL := bash
 export OMP_NUM_THREADS ?= 1
 
 # On every core, neighbours together as long as no core is idle: what the tests of a file share is made once or twice.
-PYTEST := $(BIN)/python -m pytest --numprocesses auto --dist worksteal
+# Python keeps its bytecode whatever the environment says: else each worker and each of many short commands compiles all.
+PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest --numprocesses auto --dist worksteal
 
 .PHONY: help install walk predict answers test test-all test-wheel test-sdist test-lowest notebooks licences test-learners test-rllib test-kills fuzz extremes mutants check format bench benchmark docs lock clean
 

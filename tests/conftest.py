@@ -24,10 +24,21 @@ for settings in (
 """A program that calls every kernel, so that numba has them all in its cache."""
 
 
+compiling: list[subprocess.Popen] = []
+"""The process that compiles the kernels, as long as it is not awaited."""
+
+
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_setupnodes():
-    """Compile the kernels once, before pytest-xdist starts its workers: each would compile all of them."""
-    subprocess.run([sys.executable, "-c", COMPILE], check=False)  # what fails here fails in the tests
+    """Begin to compile the kernels once: each of pytest-xdist's workers, which collect tests meanwhile, would."""
+    compiling.append(subprocess.Popen([sys.executable, "-c", COMPILE]))
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_node_collection_finished():
+    """Give no worker a test before the kernels are compiled; what fails there fails in the tests."""
+    while compiling:
+        compiling.pop().wait()
 
 
 @pytest.fixture(scope="module")
