@@ -2,13 +2,14 @@
 
 import numpy as np
 from numpy.typing import NDArray
+from parts import judge, total
 
 from springfoot.envs.control.reference_walk import reference_walks, rows
 from springfoot.envs.control.subjects import Subjects
 from springfoot.envs.physics.measurement import BODY_ROW, Measurement
 from springfoot.envs.physics.model import LEFT, RIGHT
 from springfoot.envs.settings.settings import settings_from
-from springfoot.envs.task.reward import TERMS, Task, judge, total
+from springfoot.envs.task.reward import TERMS, Task
 from springfoot.gait.body.body import GRAVITY, Body
 from springfoot.gait.people.human import human_gait
 from springfoot.gait.plan.com_plan import over_peoples_zmp

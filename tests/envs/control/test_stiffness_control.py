@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from parts import move, stiffen
 
 from springfoot.envs.control.constants import slope_constants
 from springfoot.envs.control.legs import slope_table
@@ -10,8 +11,6 @@ from springfoot.envs.control.phase_table import GRID, PLACE, SAMPLES, PhaseTable
 from springfoot.envs.control.stiffness_control import (
     FootSprings,
     action_of,
-    move,
-    stiffen,
     stiffness_of,
     stiffness_ranges,
 )

@@ -4,16 +4,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from parts import drive, move
 
 from springfoot.agents.training.sb3_vec_env import SegmentedFootBipedVecEnv
 from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.batch.step_result import INFO, Tick
 from springfoot.envs.control.constants import slope_constants
 from springfoot.envs.control.equilibrium import foot_curves
-from springfoot.envs.control.legs import LegController, drive, slope_table
+from springfoot.envs.control.legs import LegController, slope_table
 from springfoot.envs.control.reference_walk import rows as rows_of
 from springfoot.envs.control.reference_walk import tabulated_speeds
-from springfoot.envs.control.stiffness_control import FootSprings, action_of, move
+from springfoot.envs.control.stiffness_control import FootSprings, action_of
 from springfoot.envs.control.subjects import Subjects
 from springfoot.envs.env import SegmentedFootBiped
 from springfoot.envs.physics.model import JOINTS, SIDES
