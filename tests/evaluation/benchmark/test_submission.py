@@ -35,7 +35,20 @@ TASK = "Walk-v0"
 
 @pytest.fixture(scope="module")
 def submitted(tmp_path_factory):
-    """A submission of `pretrained`, and one of springs."""
+    """A submission of a policy's file, so soft that it soon falls with a prosthesis, and a committed one of springs."""
+    folder = tmp_path_factory.mktemp("submissions")
+    policy = read_policy("pretrained")
+    soft = replace(policy, biases=(*policy.biases[:-1], np.full_like(policy.biases[-1], -100.0)))
+    save_policy(folder / "soft.safetensors", soft)
+    return [
+        benchmark.submit(str(folder / "soft.safetensors"), "Prosthesis-v0", "ours", folder / "ours", threads=1),
+        benchmark.read_submission(REPOSITORY / "benchmarks" / "submissions" / TASK / "constant"),
+    ]
+
+
+@pytest.fixture(scope="module")
+def walking(tmp_path_factory):
+    """A submission of `pretrained`, and one of springs, that walk to the end."""
     folder = tmp_path_factory.mktemp("submissions")
     return [
         benchmark.submit("pretrained", TASK, "ours", folder / "ours", threads=1),
@@ -53,13 +66,13 @@ def copied(submission, folder):
 
 
 @pytest.mark.slow
-def test_a_submission_is_judged_to_the_same_bits_on_any_number_of_threads(submitted, tmp_path):
-    folders = [copied(each, tmp_path / each.name) for each in submitted]
+def test_a_submission_is_judged_to_the_same_bits_on_any_number_of_threads(walking, tmp_path):
+    folders = [copied(each, tmp_path / each.name) for each in walking]
     assert main(["judge", *map(str, folders), "--threads", "2"]) == 0
     judged = {folder.name: read_object(folder / benchmark.JUDGED, "judgement") for folder in folders}
     assert [each["same_bits"] for each in judged.values()] == [True, True]
     rows = judged_rows(tmp_path)
-    means = {each.name: each.walks.returns.mean() for each in submitted}
+    means = {each.name: each.walks.returns.mean() for each in walking}
     assert [row.submission.name for row in rows] == sorted(means, key=lambda name: -means[name])
     for row in rows:
         told = judged[row.submission.name]
@@ -151,8 +164,8 @@ def test_numbers_repeat_one_by_one():
 
 
 @pytest.mark.slow
-def test_a_submission_that_does_not_repeat_is_not_judged(submitted, tmp_path, capsys):
-    folder = copied(submitted[1], tmp_path / "better")
+def test_a_submission_that_does_not_repeat_is_not_judged(walking, tmp_path, capsys):
+    folder = copied(walking[1], tmp_path / "better")
     values = read_object(folder / benchmark.SUBMISSION, "submission")
     values["returns"].reverse()  # the same mean
     (folder / benchmark.SUBMISSION).write_bytes(object_with_digest(values))
@@ -175,7 +188,9 @@ def test_a_changed_policy_is_refused(submitted, tmp_path):
 def test_a_changed_number_is_refused(submitted, tmp_path):
     folder = copied(submitted[0], tmp_path / "edited")
     path = folder / benchmark.SUBMISSION
-    path.write_text(path.read_text().replace('"falls": 0', '"falls": 1'))
+    text, falls = path.read_text(), int(submitted[0].walks.fell.sum())
+    assert f'"falls": {falls}' in text and falls > 0
+    path.write_text(text.replace(f'"falls": {falls}', f'"falls": {falls - 1}'))
     with pytest.raises(SpringfootError, match="is damaged or was changed"):
         benchmark.read_submission(folder)
 
