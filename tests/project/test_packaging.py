@@ -258,35 +258,45 @@ def users_python(wheel, tmp_path_factory):
     return python
 
 
-def verdict(code, mode, python, folder):
-    """What pyright says of a user's file in one of its modes: each message as one line."""
-    (folder / "user.py").write_text(code, encoding="utf-8")
-    (folder / "pyrightconfig.json").write_text(json.dumps({"typeCheckingMode": mode}))
-    command = [sys.executable, "-m", "pyright", "--outputjson", "--pythonpath", str(python), "user.py"]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
-    report = json.loads(done.stdout)
-    assert report["summary"]["filesAnalyzed"] == 1
-    return [f"{one['range']['start']['line'] + 1}: {one['message']}" for one in report["generalDiagnostics"]]
-
-
-def test_no_public_name_is_unknown_to_a_strict_type_checker(users_python, tmp_path):
+@pytest.fixture(scope="module")
+def verdicts(users_python, tmp_path_factory):
+    """What pyright says of users' files, by their names: each message as one line. One process checks them all."""
     public = [room for room in ROOMS if room not in ("files", "cli", "examples")]
     names = {room: import_module(f"springfoot.{room}").__all__ for room in public}
     imports = [f"from springfoot.{room} import {', '.join(public)}" for room, public in names.items()]
     uses = [f"print({name})" for public in names.values() for name in public]
-    assert verdict("\n".join([*imports, *uses]) + "\n", "strict", users_python, tmp_path) == []
-    assert verdict(STRICT, "strict", users_python, tmp_path) == []
-
-
-def test_the_readmes_python_passes_a_type_checker(users_python, tmp_path):
     blocks = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
-    said = verdict("\n".join(blocks), "standard", users_python, tmp_path)
-    assert [line for line in said if "Expression value is unused" not in line] == []
+    programs = {
+        "every_name.py": ("strict", "\n".join([*imports, *uses]) + "\n"),
+        "user.py": ("strict", STRICT),
+        "mistaken.py": ("strict", STRICT.replace("height=1.80", 'height="tall"')),
+        "readme.py": ("standard", "\n".join(blocks)),
+    }
+    folder = tmp_path_factory.mktemp("users")
+    for name, (mode, code) in programs.items():
+        (folder / name).write_text(f"# pyright: {mode}\n{code}", encoding="utf-8")
+    (folder / "pyrightconfig.json").write_text("{}")
+    command = [sys.executable, "-m", "pyright", "--outputjson", "--pythonpath", str(users_python), *programs]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
+    report = json.loads(done.stdout)
+    assert report["summary"]["filesAnalyzed"] == len(programs)
+    said: dict[str, list[str]] = {name: [] for name in programs}
+    for one in report["generalDiagnostics"]:
+        said[Path(one["file"]).name].append(f"{one['range']['start']['line']}: {one['message']}")
+    return said
 
 
-def test_a_type_checker_finds_a_users_mistake(users_python, tmp_path):
-    wrong = STRICT.replace("height=1.80", 'height="tall"')
-    assert any('"height"' in line for line in verdict(wrong, "strict", users_python, tmp_path))
+@pytest.mark.parametrize("program", ["every_name.py", "user.py"])
+def test_no_public_name_is_unknown_to_a_strict_type_checker(verdicts, program):
+    assert verdicts[program] == []
+
+
+def test_the_readmes_python_passes_a_type_checker(verdicts):
+    assert [line for line in verdicts["readme.py"] if "Expression value is unused" not in line] == []
+
+
+def test_a_type_checker_finds_a_users_mistake(verdicts):
+    assert any('"height"' in line for line in verdicts["mistaken.py"])
 
 
 @pytest.fixture(scope="module")
