@@ -72,8 +72,18 @@ def same(ours: Any, theirs: Any) -> None:
         assert len(ours) == len(theirs)
         for mine, other in zip(ours, theirs, strict=True):
             same(mine, other)
-    else:
+    elif not _plainly_same(ours, theirs):
         np.testing.assert_array_equal(ours, theirs)
+
+
+def _plainly_same(ours: Any, theirs: Any) -> bool:
+    """Return True for arrays of the same bytes, and for equal numbers and words.
+
+    NumPy's own test says what differs, and takes fifty times as long.
+    """
+    if not isinstance(ours, np.ndarray):
+        return bool(ours == theirs)
+    return (ours.dtype, ours.shape, ours.tobytes()) == (theirs.dtype, theirs.shape, theirs.tobytes())
 
 
 @pytest.mark.parametrize(
