@@ -1,7 +1,8 @@
 """Cut measured walks into strides: common time, heel strikes and toe-offs, curves over percent of each stride."""
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -405,16 +406,22 @@ def _strides_of_leg(walk: MeasuredWalk, side: str, weight: float | None) -> NDAr
     Methods: the vertical force, the events in the file, the leg's motion. `weight` as of `_legs_by_weight`.
     """
     leg = walk.legs[side]
-    candidates = (_contacts_of_force(walk, leg, weight), walk.contacts.get(side), _contacts_of_motion(walk, leg))
+    methods: tuple[Callable[[], Contacts | None], ...] = (
+        lambda: _contacts_of_force(walk, leg, weight),
+        lambda: walk.contacts.get(side),
+        lambda: _contacts_of_motion(walk, leg),
+    )
     best = np.empty((0, 3))
-    for contacts in filter(None, candidates):
+    for method in methods:
+        # A later method counts only if those before it found too few.
+        if len(best) >= FEWEST_STRIDES or (contacts := method()) is None:
+            continue
         strides = contacts.strides(after=walk.first)
         strides = strides[strides[:, 2] <= walk.last]
         duration = strides[:, 2] - strides[:, 0]
         usual = np.median(duration) if len(duration) else 0.0
         strides = strides[np.abs(duration - usual) <= UNEVEN_STRIDE * usual]
-        # A later method counts only if those before it found too few.
-        if len(strides) > len(best) and len(best) < FEWEST_STRIDES:
+        if len(strides) > len(best):
             best = strides
     return best
 
@@ -491,12 +498,18 @@ def _events_of_motion(thigh: NDArray, knee: NDArray, ankle: NDArray, tick: float
 
 def _smooth(angle: NDArray, tick: float) -> NDArray:
     """Return the angle (T,) after a low-pass without delay: a Butterworth filter of second order, forward and back."""
-    from scipy.signal import butter, sosfiltfilt  # half a second to import, and only files need it
+    from scipy.signal import sosfiltfilt  # half a second to import, and only files need it
 
     # The ends are continued by half a second, or by as much as a short record has.
-    return sosfiltfilt(
-        butter(2, CUTOFF, fs=1 / tick, output="sos"), angle, padlen=min(len(angle) - 1, round(0.5 / tick))
-    )
+    return sosfiltfilt(_low_pass(tick), angle, padlen=min(len(angle) - 1, round(0.5 / tick)))
+
+
+@lru_cache(maxsize=16)
+def _low_pass(tick: float) -> NDArray:
+    """Return the filter of `_smooth` for samples `tick` [s] apart; its design takes longer than its use."""
+    from scipy.signal import butter  # as in `_smooth`
+
+    return np.asarray(butter(2, CUTOFF, fs=1 / tick, output="sos"))
 
 
 def _body_weight(force: NDArray) -> float:
