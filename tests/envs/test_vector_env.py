@@ -30,6 +30,8 @@ def same_info(ours: dict, theirs: dict) -> None:
                 np.testing.assert_array_equal(mine, other, err_msg=key)
         else:
             assert ours[key].dtype == value.dtype, key
+            if (ours[key].shape, ours[key].tobytes()) == (value.shape, value.tobytes()):
+                continue  # NumPy's own test, which says what differs, takes fifty times as long
             np.testing.assert_array_equal(ours[key], value, err_msg=key)
 
 

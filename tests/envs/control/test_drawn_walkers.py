@@ -93,14 +93,14 @@ def test_drawn_bodies_walk_as_bodies_of_the_settings(further):
     together = Biped(settings_from(drawn_bodies=BODIES, **further), len(BODIES))
     ids = np.arange(len(BODIES))
     together.reset(ids, [5] * len(ids), start=0.2, given={"body": ids, "mass": np.full(len(ids), 70.0)})
+    twin = pickle.loads(pickle.dumps(together))
+    steps = [twin.step(action) for action in actions(len(BODIES), 40)]
     for index, ratios in enumerate(BODIES):
         alone = Biped(settings_from(**ratios, **further), 1)
         alone.reset(np.array([0]), [5], start=0.2, given={"mass": np.array([70.0])})
         assert together.model_of(index).body_mass.sum() == alone.model_of(0).body_mass.sum()
         np.testing.assert_array_equal(together.observe()[index], alone.observe()[0])
-        twin = pickle.loads(pickle.dumps(together))
-        for action in actions(len(BODIES), 40):
-            seen = twin.step(action)
+        for action, seen in zip(actions(len(BODIES), 40), steps, strict=True):
             own = alone.step(action[index : index + 1])
             np.testing.assert_array_equal(seen.observation[index], own.observation[0])
             np.testing.assert_array_equal(seen.values[index], own.values[0])
