@@ -163,7 +163,7 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
     once: `{"height": 1.85, "mass": 95, "speed": 1.4}`. All scales with the body as mechanics do, and is linear between
     walks tabulated every 0.1 m/s. With `speed_interval` the commanded speed, which is observed, goes to new ones.
     With `drawn_bodies`, such as `[{}, {"leg_ratio": 1.03}, {"carried_ratio": 0.2, "weight": 3}]`, every episode draws
-    its own proportions and load; the option `body` is an index in it.
+    its own proportions, load and step time; the option `body` is an index in it.
 
     ## Episode end
     Termination: the hip is lower than 0.65 m (x height / 1.70 m), the trunk is tilted by more than 0.8 rad, or the
@@ -219,8 +219,9 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
     | `speed_range`             | `None`          | speeds drawn at each reset [m/s], in place of `speed`              |
     | `speed_interval`          | `None`          | mean time between changes of the commanded speed [s]               |
     | `speed_rate`              | `0.25`          | rate at which it goes to a new one [m/s^2]                         |
+    | `step_time_ratio`         | `1.0`           | step time over people's at the same speed, 0.8 to 1.2              |
     | **reference**             |                 |                                                                    |
-    | `cadence`                 | `"people"`      | step length and time of `"people"` or of the `"thesis"`            |
+    | `cadence`                 | `"people"`      | step length and time of `"people"`, `"thesis"` or least `"effort"` |
     | `guide`                   | `"people"`      | target of the walk: `"people"`, or its own `"plan"`                |
     | `people_file`             | `None`          | file of people's data in place of the package's, in its form       |
     | `plan_file`               | `None`          | the plan's style and leg constants in place of the package's       |

@@ -100,7 +100,8 @@ def constants_name(
 ) -> str:
     """Return the name of the constants for these settings and `speed` [m/s at 1.70 m] in a file of constants.
 
-    The equilibria "angle" and "phase" share those of "planned"; a body that follows the plan has one set for all.
+    The equilibria "angle" and "phase" share those of "planned"; a body that follows the plan has one set for all. The
+    cadence "effort" has those of people's.
     """
     if follows_plan:
         name = "predicted"
@@ -108,7 +109,7 @@ def constants_name(
         name = "neutral"
     else:
         name = "planned"
-    if cadence != "people":
+    if cadence == "thesis":
         name += f", {cadence} cadence"
     if feedforward != "people" and not follows_plan:  # the plan's moments are fed forward in any case
         name += f", {feedforward}'s moments"

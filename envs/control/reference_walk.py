@@ -89,7 +89,7 @@ def reference_walk_at(
         target = gait_of(plan)
         moments = _moments_of(target, body)
         return ReferenceWalk(body=body, speed=speed, target=target, plan=plan, constants=tuple(legs), moments=moments)
-    if settings.human is None and settings.people_file is None:
+    if settings.human is None and settings.people_file is None and settings.step_time_ratio == 1.0:
         plan = _plan(body, speed, settings.cadence)
     else:
         plan = plan_walk(body, speed, settings.cadence, human=people)

@@ -59,8 +59,11 @@ def check_people_file(name: object) -> None:
         harmonics(Path(name))  # raises for another kind of file
 
 
-def check_guide(follows_plan: bool, human: object, plan_file: object) -> None:
-    """Refuse the setting `human` with guide `plan` (`follows_plan`), and `plan_file` with guide `people`."""
+def check_guide(follows_plan: bool, human: object, plan_file: object, cadence: str) -> None:
+    """Refuse the setting `human` with guide `plan` (`follows_plan`), `plan_file` and cadence `effort` with guide
+    `people`."""
+    if cadence == "effort" and not follows_plan:
+        raise SpringfootError("cadence 'effort' needs guide 'plan', got 'people'")
     if follows_plan and human is not None:
         raise SpringfootError("human must be None with guide 'plan': the plan replaces human data")
     if plan_file is not None:

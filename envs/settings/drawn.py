@@ -10,6 +10,7 @@ import numpy as np
 
 from springfoot.errors import SpringfootError, as_float, quoted, require_choice, require_number
 from springfoot.gait.body.body import Body
+from springfoot.gait.people.human import STEP_TIME_RATIO_RANGE
 
 from ..physics.foot import Foot
 from .feet import ENGAGES, TABLES, FootSetting, foot_setting
@@ -56,11 +57,12 @@ class DrawnFoot:
 
 @dataclass(frozen=True, kw_only=True)
 class DrawnBody:
-    """Proportions and load of `drawn_bodies`; None for those of the settings."""
+    """Proportions, load and step time of `drawn_bodies`; None for those of the settings."""
 
     leg_ratio: float | None = None
     foot_ratio: float | None = None
     carried_ratio: float | None = None
+    step_time_ratio: float | None = None
     weight: float = 1.0
     """Chance to be drawn, relative to the others' [-]."""
 
@@ -100,7 +102,8 @@ def drawn_bodies_setting(value: Any, body: Body) -> tuple[DrawnBody, ...] | None
     def checked(name: str, entry: DrawnBody) -> DrawnBody:
         """Return the entry with floats for its ratios, with which the settings' body is possible."""
         try:
-            replace(body, **entry.ratios)
+            require_number("step_time_ratio", entry.ratios.get("step_time_ratio", 1.0), *STEP_TIME_RATIO_RANGE)
+            replace(body, **{name: value for name, value in entry.ratios.items() if name != "step_time_ratio"})
         except SpringfootError as error:
             raise SpringfootError(f"{name}: {error}") from None
         return replace(entry, **{ratio: float(number) for ratio, number in entry.ratios.items()})

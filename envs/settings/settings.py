@@ -21,7 +21,7 @@ from springfoot.gait.body.body import (
     Body,
     CarriedAt,
 )
-from springfoot.gait.people.human import PEOPLE_FILE, HumanGait, human_gait
+from springfoot.gait.people.human import PEOPLE_FILE, STEP_TIME_RATIO_RANGE, HumanGait, human_gait
 from springfoot.gait.people.own_data import OwnGait
 from springfoot.gait.plan.plan import PLAN_SPEED_RANGE, Cadence
 from springfoot.gait.springs.stiffness import LOWEST_STIFFNESS, StiffnessSchedule
@@ -153,17 +153,21 @@ class BipedSettings:
     mass_range: tuple[float, float] | None = field(default=None, metadata=_BODY | _DRAWN)
     """Body masses drawn at each reset in place of `mass` [kg], evenly and whatever the height."""
     drawn_bodies: tuple[DrawnBody, ...] | None = field(default=None, metadata=_BODY | _DRAWN)
-    """Proportions and loads of which each reset draws one: a list of dictionaries of `leg_ratio`, `foot_ratio`,
-    `carried_ratio` (the settings' where left out) and `weight`, the relative chance. All are tabulated in the
-    beginning."""
+    """Proportions, loads and step times of which each reset draws one: a list of dictionaries of `leg_ratio`,
+    `foot_ratio`, `carried_ratio`, `step_time_ratio` (the settings' where left out) and `weight`, the relative chance.
+    All are tabulated in the beginning."""
     speed_range: tuple[float, float] | None = field(default=None, metadata=_SPEED | _DRAWN)
     """Walking speeds drawn at each reset in place of `speed` [m/s], evenly."""
     speed_interval: float | None = field(default=None, metadata=_SPEED | _DRAWN)
     """Mean time between changes of the commanded speed within an episode, drawn from `speed_range` [s]."""
     speed_rate: float = field(default=0.25, metadata=_SPEED | _KEPT)
     """Rate at which the commanded speed goes to a new one [m/s^2]."""
+    step_time_ratio: float = field(default=1.0, metadata=_SPEED)
+    """Step time over people's at the same speed [0.8..1.2]; the step length changes likewise. It needs the cadence
+    `people`."""
     cadence: Cadence = field(default="people", metadata=_REFERENCE)
-    """Step length and time: as people choose them at this speed, or the thesis's 0.6 m and 0.5 s."""
+    """Step length and time: as people choose them at this speed, the thesis's 0.6 m and 0.5 s, or with guide `plan`
+    those of least effort."""
     guide: Guide = field(default="people", metadata=_REFERENCE)
     """Target of controller, feed-forward, start and reward: people's walk (people); or the plan's own (plan), with
     people's step length and time alone (`docs/results/prediction.md`)."""
@@ -276,8 +280,12 @@ class BipedSettings:
             )
         if self.human is not None and not isinstance(self.human, OwnGait):
             object.__setattr__(self, "human", OwnGait.from_json(self.human))
+        require_number("step_time_ratio", self.step_time_ratio, *STEP_TIME_RATIO_RANGE)
+        drawn_ratios = [body.step_time_ratio or 1.0 for body in self.drawn_bodies or ()]
+        if self.cadence != "people" and {self.step_time_ratio, *drawn_ratios} != {1.0}:
+            raise SpringfootError(f"step_time_ratio needs cadence 'people', got {self.cadence!r}")
         check_people_file(self.people_file)
-        check_guide(self.follows_plan, self.human, self.plan_file)
+        check_guide(self.follows_plan, self.human, self.plan_file, self.cadence)
         require_number("episode_seconds", self.episode_seconds, self.step_seconds, unit="s")
         check_start(self.start)
         if self.stop_at is not None:
@@ -429,10 +437,13 @@ def plan_file_of(settings: BipedSettings) -> Path | None:
 def reference_gait(settings: BipedSettings, speed: float | None = None) -> HumanGait:
     """Return people's gait, or that of `settings.human`, for the body's height at `speed` [m/s], the settings' if None.
 
-    People's data come from the setting `people_file`, or from the package.
+    People's data come from the setting `people_file`, or from the package; step time and length are those of the
+    setting `step_time_ratio`.
     """
     people = PEOPLE_FILE if settings.people_file is None else Path(settings.people_file)
     speed = settings.speed if speed is None else speed
     if settings.human is None:
-        return human_gait(speed, settings.height, people)
-    return settings.human.gait(speed, settings.height, people)
+        gait = human_gait(speed, settings.height, people)
+    else:
+        gait = settings.human.gait(speed, settings.height, people)
+    return gait if settings.step_time_ratio == 1.0 else gait.paced(settings.step_time_ratio)

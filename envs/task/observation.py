@@ -45,6 +45,7 @@ SEEN = np.dtype(
         ("slope", float),
         ("stiffness", float, (len(SIDES), 2)),  # logarithm of K over its unit
         ("worn", float, WORN),
+        ("planned_step", float),
     ]
 )
 """The entries of `PERSON_OBSERVATION`, in order, before they are made dimensionless [SI]."""
@@ -122,6 +123,7 @@ def observe(rows, controls, bodies, table, observation) -> None:
             seen.slope = control.subject.slope
             for k in range(len(seen.worn)):
                 seen.worn[k] = row.worn[k]
+            seen.planned_step = 0.5 * control.subject.scale.length * targets[LEFT].stride_length
             for side in range(2):
                 for joint in range(2):
                     seen.stiffness[side, joint] = _stiffness_entry(row, control, side, joint)

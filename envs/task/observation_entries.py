@@ -71,7 +71,7 @@ def _entries() -> tuple[Entry, ...]:
 
 
 def _person_entries() -> tuple[Entry, ...]:
-    """Return the entries that only a person observes, in order: last offsets, slope, stiffness, feet and body."""
+    """Return the entries that only a person observes, in order: last offsets, slope, stiffness, feet, body, step."""
     springs = [(side, joint) for side in SIDES for joint in ("ankle", "toe")]
     return (
         *(Entry(f"last_{name}", "rad", -1.0, 1.0, "offset of the step before", False) for name in PERSON_ACTIONS),
@@ -85,6 +85,7 @@ def _person_entries() -> tuple[Entry, ...]:
         Entry("leg_ratio", "1", 0.0, 2.0, "leg length over the average at that height", False),
         Entry("foot_ratio", "1", 0.0, 2.0, "foot length over the average at that height", False),
         Entry("carried_ratio", "1", 0.0, 2.0, "load over body mass", False),
+        Entry("planned_step", "leg length", 0.0, 2.0, "step length of the plan", False),
     )
 
 

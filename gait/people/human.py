@@ -8,7 +8,7 @@ them, and all other numbers of people that the walk uses. Every function here ta
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 from importlib import resources
 from itertools import pairwise
@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from springfoot.arrays import NDArray
-from springfoot.errors import SpringfootError, quoted, require_within
+from springfoot.errors import SpringfootError, quoted, require_number, require_within
 from springfoot.files.json_file import MOST_JSON_BYTES
 from springfoot.files.text_table import read_bytes
 
@@ -72,6 +72,8 @@ HABITS = {
     "ankle_quasi_stiffness": (5, (1.0, 1e4)),
 }
 """Numbers for the foot's springs -> how many, and their range; chosen."""
+STEP_TIME_RATIO_RANGE = (0.8, 1.2)
+"""Step times over people's at the same speed [-]; chosen: people were measured at these (Umberger & Martin 2007)."""
 PEOPLE_FILE = Path(str(resources.files("springfoot.gait.people") / "human_harmonics.json"))
 """The package's own file."""
 
@@ -126,6 +128,17 @@ class HumanGait:
     """Numbers for the foot's springs, besides the curves."""
     borrowed: tuple[str, ...] = ()
     """Curves and numbers that a person's own data (`own_data`) lack, and that are people's instead."""
+
+    def paced(self, step_time_ratio: float) -> "HumanGait":
+        """Return this gait with step time and step length times `step_time_ratio`, at the same speed.
+
+        Its curves over the stride phase stay: people's own at other step times are not in the data. Raises
+        `SpringfootError` for a ratio outside `STEP_TIME_RATIO_RANGE`.
+        """
+        require_number("step_time_ratio", step_time_ratio, *STEP_TIME_RATIO_RANGE)
+        return replace(
+            self, stride_time=step_time_ratio * self.stride_time, step_length=step_time_ratio * self.step_length
+        )
 
     def mean(self, name: str, phase: ArrayLike) -> NDArray:
         """Return the mean curve `name` at stride phases of any shape; SI units and signs as listed for the class."""

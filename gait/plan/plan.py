@@ -29,7 +29,8 @@ from .leg_spin import spinning_legs
 from .posture import POSTURE_SAMPLES, LegPostures, highest_legs, legs_under_com, refuse_impossible_legs
 from .walk_style import WalkStyle
 
-Cadence = Literal["people", "thesis"]
+Cadence = Literal["people", "thesis", "effort"]
+"""Choice of step length and time: people's, the thesis's, or those of least effort, which a style tells."""
 
 PLAN_SPEED_RANGE = (0.4, 2.0)
 """Accepted speeds of the setting `speed` [m/s]; chosen: people's data reach from 0.85 to 1.96."""
@@ -133,6 +134,7 @@ def plan_walk(
         cadence: "people": step length and time as people of that height choose them at that speed (0.66 m, 0.55 s at
             1.2 m/s, 1.70 m); outside their data both change with the square root of speed. "thesis": 0.5 s a step at
             every speed (0.6 m at 1.2 m/s), times the square root of height / 1.70 m.
+            "effort": people's times `step_time_ratio` of the `style`.
         step_time: [s] in place of the cadence's; the step length follows from the speed.
         double_support: [s]; by default `DOUBLE_SUPPORT` times the step time. In a longer double support the toe rolls
             further over its tip, and the default `zmp_travel` lies further forward.
@@ -158,11 +160,14 @@ def plan_walk(
     slowest, fastest = floor(100 * slowest + 1e-6) / 100, ceil(100 * fastest - 1e-6) / 100
     speed = require_within("speed", speed, (slowest, fastest), "m/s")
     if cadence not in get_args(Cadence):
-        raise SpringfootError(f"cadence must be 'people' or 'thesis', got {cadence!r}")
+        raise SpringfootError(f"cadence must be 'people', 'thesis' or 'effort', got {cadence!r}")
+    if cadence == "effort" and style is None:
+        raise SpringfootError("cadence 'effort' needs a style, which tells its step time")
     slope = require_within("slope", slope, SLOPE_RANGE, "rad")
     human = human_gait(speed, body.height) if human is None else human
     if step_time is None:
-        step_time, step_length = _step_time_and_length(body, speed, cadence, human)
+        ratio = style.step_time_ratio if style is not None and cadence == "effort" else 1.0
+        step_time, step_length = (ratio * usual for usual in _step_time_and_length(body, speed, cadence, human))
     else:
         step_time = require_within("step_time", step_time, STEP_TIME_RANGE, "s")
         step_length = speed * step_time
@@ -239,7 +244,7 @@ def plan_walk(
 
 
 def _step_time_and_length(body: Body, speed: float, cadence: str, human: HumanGait) -> tuple[float, float]:
-    """Return step time [s] and step length [m] of a cadence ("people" or "thesis") at `speed` [m/s].
+    """Return step time [s] and step length [m] of the thesis's cadence, or people's for any other, at `speed` [m/s].
 
     `human` gives those of people at the nearest speed of their data.
     """

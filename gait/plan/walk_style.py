@@ -52,6 +52,8 @@ class WalkStyle:
     """Second harmonic of the CoM's height (`cart_table.Bob`): cosine and sine over half of `rise` [-]."""
     lean: float = 0.0
     """Pitch of the trunk [rad], forward positive; at 0 the trunk's CoM is upright over the hip."""
+    step_time_ratio: float = 1.0
+    """Step time over people's at the same speed [-]; it counts with the cadence `effort` alone."""
     foot: FootStyle
     """Style of the feet's roll and swing."""
 
@@ -75,6 +77,8 @@ def style_from(values: Mapping[str, Any]) -> WalkStyle:
     for name in POWERS:
         if getattr(style.foot, name) <= 0.0:
             raise ValueError(f"{name} must be > 0, got {getattr(style.foot, name):g}")
+    if style.step_time_ratio <= 0.0:
+        raise ValueError(f"step_time_ratio must be > 0, got {style.step_time_ratio:g}")
     if style.foot.heel_radius < 0.0:
         raise ValueError(f"heel_radius must be >= 0 m, got {style.foot.heel_radius:g}")
     if len({len(via) for via in (style.foot.via_forward, style.foot.via_up, style.foot.via_pitch)}) > 1:

@@ -2,8 +2,9 @@
 
     springfoot study persons learned learned-2
 
-A person is a policy that `springfoot train --preset person` trained. The drawn episodes have the ranges of
-that preset and seeds that no training uses; in each the commanded speed stays.
+A person is a policy that `springfoot train --preset person` trained. The drawn episodes have feet, proportions and
+loads of that preset, bodies and speeds of `WALKED`, which lie within the preset's, and seeds that no training uses; in
+each the commanded speed stays, and the step time is people's.
 """
 
 from collections.abc import Sequence
@@ -27,6 +28,8 @@ from springfoot.files.writing import csv_text
 from ..base.study import Answer, OnProgress, WalkingStudy
 from .adapting_persons import person_and_settings
 
+WALKED = {"height_range": (1.5, 1.9), "mass_range": (50.0, 90.0), "speed_range": (0.8, 1.6)}
+"""Heights [m], masses [kg] and commanded speeds [m/s] of the drawn episodes."""
 SOUND_SPEEDS = (0.9, 1.0, 1.2, 1.4, 1.5)
 """Commanded speeds on sound feet [m/s]."""
 FIRST_SEED = 50_000_000
@@ -35,6 +38,8 @@ PUSH_NEWTON = 100.0
 """Size of the pushes [N]."""
 SLOPES_DEG = (-5.0, 5.0)
 """Slopes on sound feet [deg]."""
+STEP_TIME_RATIOS = (0.85, 1.15)
+"""Step times over people's on sound feet [-]."""
 PEAKS = ("vertical_peak1_bw", "vertical_peak2_bw")
 """Peaks of the mean vertical force."""
 _BATCH = 100
@@ -52,6 +57,12 @@ class DrawnEpisode:
     walked: float
     """Mean speed of the CoM after `WARM_UP` [m/s]; NaN if it fell before."""
     fell: bool
+
+
+def _walked(preset: BipedSettings) -> BipedSettings:
+    """Return the settings of the preset with the ranges of `WALKED` and without other step times than people's."""
+    bodies = [body for body in preset.drawn_bodies or () if body.step_time_ratio is None]
+    return replace(preset, drawn_bodies=bodies, **WALKED)
 
 
 def feet_in_words(feet: Feet) -> str:
@@ -123,7 +134,7 @@ class Persons(WalkingStudy):
     @property
     def total(self) -> float:
         """Return the simulated time of all walks if none falls [s]."""
-        sound = self.episodes * (len(SOUND_SPEEDS) + len(SLOPES_DEG))
+        sound = self.episodes * (len(SOUND_SPEEDS) + len(SLOPES_DEG) + len(STEP_TIME_RATIOS))
         return len(self.persons) * self.seconds * (2 * self.drawn + sound)
 
     def ask(self, progress: OnProgress) -> Answer:
@@ -133,7 +144,7 @@ class Persons(WalkingStudy):
         for name in self.persons:
             act, settings = person_and_settings(name, {})
             ranges = replace(
-                PRESETS["person"].environment,
+                _walked(PRESETS["person"].environment),
                 acts=settings.acts,
                 stiffness_by="action",
                 person_range_deg=settings.person_range_deg,
@@ -146,6 +157,7 @@ class Persons(WalkingStudy):
             }
             sound += [self.sound_walk(name, {"speed": speed}, progress) for speed in SOUND_SPEEDS]
             sound += [self.sound_walk(name, {"slope_deg": slope}, progress) for slope in SLOPES_DEG]
+            sound += [self.sound_walk(name, {"step_time_ratio": ratio}, progress) for ratio in STEP_TIME_RATIOS]
         files = {
             "drawn.csv": _drawn_csv(drawn),
             "sound.csv": csv_text(list(sound[0]), [list(r.values()) for r in sound]),
@@ -164,6 +176,7 @@ class Persons(WalkingStudy):
             "person": name,
             "speed_m_s": settings.speed,
             "slope_deg": settings.slope_deg,
+            "step_time_ratio": settings.step_time_ratio,
             "falls": metrics["falls"],
             "episodes": metrics["episodes"],
             "walked_m_s": metrics["speed_m_s"]["mean"],
@@ -208,9 +221,10 @@ def sound_table(rows: Sequence[dict[str, Any]]) -> str:
         angles = " / ".join(text_of(row[f"{joint}_rms_deg"], ".1f") for joint in ("thigh", "knee", "ankle"))
         forces = " / ".join(text_of(row[f"{way}_r"], ".3f") for way in ("vertical", "forward"))
         slope = f", {row['slope_deg']:+g}°" if row["slope_deg"] else ""
+        pace = f", step time × {row['step_time_ratio']:g}" if row["step_time_ratio"] != 1.0 else ""
         lines.append(
             [
-                f"{row['person']}, {row['speed_m_s']:g} m/s{slope}",
+                f"{row['person']}, {row['speed_m_s']:g} m/s{slope}{pace}",
                 f"{row['falls']} of {row['episodes']}",
                 text_of(row["walked_m_s"], ".3f"),
                 angles,

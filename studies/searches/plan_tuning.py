@@ -3,17 +3,18 @@
     springfoot study plan-tuning --speeds 1.2
     springfoot study plan-tuning --speeds 0.8 1.2 1.6
 
-A plan has people's step length and time at its speed. The search chooses everything else by the least effort of the
-plan's inverse dynamics (`springfoot.gait.plan.effort`), with the swing foot clear of the floor and joints within their
-range. It starts at round numbers. At several speeds it finds one style that changes linearly with speed: plans of least
-effort differ much at nearly the same price, so separate searches would add their luck to the change with speed.
+A plan has people's step length and time at its speed, or with `--cadence effort` those that the search chooses. The
+search chooses everything else by the least effort of the plan's inverse dynamics (`springfoot.gait.plan.effort`), with
+the swing foot clear of the floor and joints within their range. It starts at round numbers. At several speeds it finds
+one style that changes linearly with speed: plans of least effort differ much at nearly the same price, so separate
+searches would add their luck to the change with speed.
 """
 
 import json
 from dataclasses import dataclass, fields
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, Literal
 
 import cma
 import numpy as np
@@ -47,6 +48,8 @@ from .cma_search import asked_of, generations
 from .constants_file import read_styles
 from .prediction_table import prediction_numbers, prediction_table
 
+PlanCadence = Literal["people", "effort"]
+"""Cadences that a search of plans takes."""
 CHOICES: dict[str, tuple[float, float, float, float]] = {
     "double_support": (0.2, 0.05, 0.06, 0.4),  # of the step time
     "lowest": (0.5, 0.2, -0.5, 1.5),  # of double support
@@ -79,6 +82,10 @@ CHOICES: dict[str, tuple[float, float, float, float]] = {
     "toe_swing": (0.0, 0.1, -0.3, 1.0),  # rad
 }
 """Choice of the search -> its start, one unit step, and its least and largest value."""
+STEP_TIME = {"step_time_ratio": (1.0, 0.1, 0.7, 1.4)}
+"""Further choice with the cadence `effort`, in the form of `CHOICES`: step time over people's at the speed."""
+CHOICES_OF = {"people": CHOICES, "effort": CHOICES | STEP_TIME}
+"""Cadence -> the choices of a search."""
 GROUPS = {"via_forward": 3, "via_up": 3, "via_pitch": 3, "heel_rise": 2, "zmp_way": 2, "rise_again": 2}
 """Entry of a style that holds several numbers -> how many; `CHOICES` has them one by one, as `NAME_1`, `NAME_2`."""
 LEAST_ADVANCE = 0.005
@@ -93,10 +100,10 @@ IMPOSSIBLE = 30.0
 """Cost of an impossible plan, to which the distance of its choices from the start is added; chosen."""
 
 
-def style_at(vector: NDArray) -> WalkStyle:
-    """Return the style at a vector (len(CHOICES),) of the search, in unit steps from the start of each choice."""
+def style_at(vector: NDArray, cadence: PlanCadence = "people") -> WalkStyle:
+    """Return the style at a vector of the search, in unit steps from the start of each choice of `CHOICES_OF`."""
     values = {}
-    for (name, (start, unit, least, most)), step in zip(CHOICES.items(), vector, strict=True):
+    for (name, (start, unit, least, most)), step in zip(CHOICES_OF[cadence].items(), vector, strict=True):
         values[name] = round(float(np.clip(start + unit * step, least, most)), 5)
     groups = {name: [values.pop(f"{name}_{k + 1}") for k in range(count)] for name, count in GROUPS.items()}
     travel = [values.pop("zmp_from"), values.pop("zmp_to")]
@@ -110,7 +117,7 @@ def style_at(vector: NDArray) -> WalkStyle:
     return style_from(of_walk | {"foot": of_foot})
 
 
-def vector_of(style: WalkStyle) -> NDArray:
+def vector_of(style: WalkStyle, cadence: PlanCadence = "people") -> NDArray:
     """Return the vector of the search for a style, the inverse of `style_at`."""
     values: dict[str, Any] = style.to_json()
     values |= values.pop("foot")
@@ -120,11 +127,16 @@ def vector_of(style: WalkStyle) -> NDArray:
         if len(group) != count:
             raise SpringfootError(f"a search cannot begin at a style with {len(group)} of {name}, it needs {count}")
         values |= {f"{name}_{k + 1}": value for k, value in enumerate(group)}
-    return np.array([(values[name] - start) / unit for name, (start, unit, *_) in CHOICES.items()])
+    return np.array([(values[name] - start) / unit for name, (start, unit, *_) in CHOICES_OF[cadence].items()])
 
 
 def price(
-    body: Body, speed: float, vector: NDArray, weights: tuple[float, ...] = PRICES, muscle: Muscle = AS_IS
+    body: Body,
+    speed: float,
+    vector: NDArray,
+    weights: tuple[float, ...] = PRICES,
+    muscle: Muscle = AS_IS,
+    cadence: PlanCadence = "people",
 ) -> tuple[float, WalkPlan | None, Effort | None]:
     """Return the cost of the plan at a vector, the plan and its effort; None for both if the plan is impossible.
 
@@ -134,16 +146,17 @@ def price(
         vector: vector of the search (`style_at`).
         weights: weights of work, activation, its rate, and acceleration.
         muscle: muscles whose effort counts.
+        cadence: step length and time, people's or those of the vector.
 
     The cost is the weighted effort and a price for a low swing foot, joints beyond their range, and choices beyond
     their bounds.
     """
     outside = sum(
         max(0.0, least - start - unit * x, start + unit * x - most) ** 2
-        for (start, unit, least, most), x in zip(CHOICES.values(), vector, strict=True)
+        for (start, unit, least, most), x in zip(CHOICES_OF[cadence].values(), vector, strict=True)
     )
     try:
-        plan = plan_walk(body, speed, style=style_at(vector))
+        plan = plan_walk(body, speed, cadence, style=style_at(vector, cadence))
         effort = effort_of(plan, muscle)
     except SpringfootError:
         return IMPOSSIBLE + PER_UNIT * outside + float(np.linalg.norm(vector)), None, None
@@ -165,6 +178,8 @@ class PlanTuning(Study):
     speeds: tuple[float, ...] = (1.2,)
     """Speeds [m/s] at 1.70 m, ascending. The search prices plans at all of them by their mean; styles are found for the
     first and the last, and are linear in speed in between."""
+    cadence: PlanCadence = "people"
+    """Step length and time of the plans: people's, or those of least effort."""
     generations: int = 200
     """Generations of the search."""
     population: int = 20
@@ -219,9 +234,10 @@ class PlanTuning(Study):
         """Search, and write the styles."""
         body = Body()
         options = {"popsize": self.population, "seed": self.seed + 1, "verbose": -9}
-        begin = np.zeros((len(self.found_speeds), len(CHOICES)))
+        begin = np.zeros((len(self.found_speeds), len(CHOICES_OF[self.cadence])))
         if self.start is not None:
-            begin = np.stack([vector_of(least_work(speed, self.start)) for speed in self.found_speeds])
+            styles = [least_work(speed, self.start) for speed in self.found_speeds]
+            begin = np.stack([vector_of(style, self.cadence) for style in styles])
         strategy = cma.CMAEvolutionStrategy(begin.ravel(), self.sigma, options)
         lines = []
         best_cost = np.inf
@@ -239,9 +255,9 @@ class PlanTuning(Study):
             progress(1)
             if generation % 10 == 9:
                 tqdm.write(f"generation {generation + 1}: best {lines[-1][1]:.4f}, median {lines[-1][2]:.4f}")
-        styles = {speed: style_at(self._vector_at(best, speed)) for speed in self.found_speeds}
-        self._write_styles(styles)
-        parts = [f"{speed:g} m/s: {json.dumps(style.to_json())}" for speed, style in styles.items()]
+        found = {speed: style_at(self._vector_at(best, speed), self.cadence) for speed in self.found_speeds}
+        self._write_styles(found)
+        parts = [f"{speed:g} m/s: {json.dumps(style.to_json())}" for speed, style in found.items()]
         for speed in self.speeds:
             cost, plan, effort = self._price(body, speed, self._vector_at(best, speed))
             parts.append(f"{speed:g} m/s: paid {cost:.4f}: {effort}")
@@ -271,7 +287,7 @@ class PlanTuning(Study):
     def _price(self, body: Body, speed: float, vector: NDArray) -> tuple[float, WalkPlan | None, Effort | None]:
         """Return cost, plan and effort of `price` at a vector, with the weights and muscles of the flags."""
         muscle = Muscle(tissue=self.tissue, tendon=self.tendon, toe_tendon=self.toe_tendon)
-        return price(body, speed, vector, self.weights, muscle)
+        return price(body, speed, vector, self.weights, muscle, self.cadence)
 
     def _write_styles(self, styles: dict[float, WalkStyle]) -> None:
         """Write `styles` by speed [m/s], and the command that found them, into the file of styles; those at other

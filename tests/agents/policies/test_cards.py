@@ -20,7 +20,7 @@ def test_each_loads_by_name_and_has_a_card(name):
     policy = read_policy(name)
     card = policy_card(name)
     assert card.startswith(f"**{name}.** ") and sha256(find_policy(name).read_bytes()).hexdigest() in card
-    layers = "80 - 128 - 128 - 5, tanh, for each leg, the right one's mirrored"
+    layers = "81 - 128 - 128 - 5, tanh, for each leg, the right one's mirrored"
     assert f"network: {layers if name.startswith('learned') else f'43 - 64 - 64 - 4, {policy.activation}'}; " in card
 
 

@@ -101,6 +101,11 @@ def test_bodies_are_drawn_by_their_weights_and_keep_the_settings_ratios():
     assert settings_of_bodies(settings_from()) == (settings_from(),)
 
 
+def test_step_times_are_drawn_with_the_bodies():
+    of_bodies = settings_of_bodies(settings_from(drawn_bodies=[{}, {"step_time_ratio": 0.9}], step_time_ratio=1.1))
+    assert [each.step_time_ratio for each in of_bodies] == [1.1, 0.9]
+
+
 @pytest.mark.parametrize(
     ("entry", "message"),
     [
@@ -159,7 +164,11 @@ def test_a_bad_foot_is_refused_by_its_number(entry, message):
     [
         ({"leg_ratio": 2}, r"drawn_bodies\[0\]: leg_ratio must be in \[0.94, 1.06\]"),
         ({"carried_ratio": "a"}, r"drawn_bodies\[0\]: carried_ratio must be in"),
-        ({"height": 1.8}, r"drawn_bodies\[0\] has no 'height'; valid: leg_ratio, foot_ratio, carried_ratio, weight"),
+        ({"step_time_ratio": 1.3}, r"drawn_bodies\[0\]: step_time_ratio must be .*0.8.*1.2.*got 1.3"),
+        (
+            {"height": 1.8},
+            r"drawn_bodies\[0\] has no 'height'; valid: leg_ratio, foot_ratio, carried_ratio, step_time_ratio, weight",
+        ),
         ({"weight": -1}, r"drawn_bodies\[0\]: weight must be a finite number > 0"),
     ],
 )

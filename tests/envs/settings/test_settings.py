@@ -118,6 +118,13 @@ BAD = [
     ({"equilibrium": "x"}, ["equilibrium", "'planned'", "'phase'"]),
     ({"equilibrium": ["planned"]}, ["equilibrium", "'planned'"]),
     ({"equilibrium": "phase"}, ["phase", "schedule"]),
+    ({"cadence": "effort"}, ["cadence 'effort' needs guide 'plan', got 'people'"]),
+    ({"step_time_ratio": 1.3}, ["step_time_ratio", "0.8", "1.2", "got 1.3"]),
+    ({"step_time_ratio": 0.9, "cadence": "thesis"}, ["step_time_ratio needs cadence 'people', got 'thesis'"]),
+    (
+        {"drawn_bodies": [{"step_time_ratio": 0.9}], "cadence": "thesis"},
+        ["step_time_ratio needs cadence 'people', got 'thesis'"],
+    ),
     ({"action_mode": "relative"}, ["action_mode", "'absolute'", "'residual'"]),
     ({"decisions": "30hz"}, ["decisions", "'100hz'", "'event'"]),
     ({"stiffness_joints": "knee"}, ["stiffness_joints", "'ankle'", "'toe'"]),

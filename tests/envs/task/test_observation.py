@@ -1,14 +1,18 @@
 """The observation: each entry is what its name says, finite and within bounds."""
 
+from math import sqrt
+
 import numpy as np
 import pytest
 from planned_body import Setup
 
+from springfoot.envs import Biped
 from springfoot.envs.physics.foot import SOUND
 from springfoot.envs.physics.model import ACTIONS, LEFT, RIGHT
 from springfoot.envs.settings.settings import body_of, settings_from
 from springfoot.envs.task.observation_entries import OBSERVATION
 from springfoot.envs.task.worn import worn_entries
+from springfoot.gait import human_gait
 from springfoot.gait.body.body import GRAVITY
 
 
@@ -107,3 +111,21 @@ def test_a_brace_of_no_stiffness_is_told_as_none(engages):
     settings = settings_from(right_foot={"kind": "intact", "orthosis": brace})
     body = body_of(settings)
     assert (worn_entries(body, settings.feet) == worn_entries(body, SOUND)).all()
+
+
+def test_the_planned_step_is_told_in_leg_lengths_of_the_body_that_was_drawn():
+    settings = settings_from(
+        acts="person",
+        height_range=(1.5, 1.9),
+        speed_range=(1.0, 1.3),
+        drawn_bodies=[{}, {"step_time_ratio": 0.85}, {"leg_ratio": 1.05, "step_time_ratio": 1.15}],
+    )
+    biped = Biped(settings, 3)
+    speed = 1.2 * sqrt(1.8 / 1.7)  # as 1.2 m/s, a tabulated speed, at the height of the settings
+    given = {"body": np.arange(3), "height": np.full(3, 1.8), "mass": np.full(3, 70.0), "speed": np.full(3, speed)}
+    biped.reset(np.arange(3), list(range(3)), given=given)
+    seen = biped.observe()[:, biped.observation_names.index("planned_step")]
+    people = human_gait(speed, 1.8)
+    step = sqrt(people.step_length * speed * people.stride_time / 2)  # as the plan, between measured length and time
+    for told, ratio, body in zip(seen, (1.0, 0.85, 1.15), biped.subjects.bodies, strict=True):
+        assert told == pytest.approx(ratio * step / body.leg_length, rel=1e-6)

@@ -116,3 +116,12 @@ def test_unknown_curve_names_the_known_ones():
 def test_fit_command_refuses_a_folder_without_data(tmp_path):
     with pytest.raises(SpringfootError, match=r"human_gait\.csv"):
         fit_human.fit(tmp_path)
+
+
+def test_another_step_time_at_the_same_speed_has_another_step_length_and_the_same_curves():
+    usual, quick = human_gait(1.2, 1.7), human_gait(1.2, 1.7).paced(0.8)
+    assert quick.stride_time == 0.8 * usual.stride_time
+    assert quick.step_length / quick.stride_time == pytest.approx(usual.step_length / usual.stride_time, rel=1e-12)
+    assert quick.mean("knee", 0.3) == usual.mean("knee", 0.3)
+    with pytest.raises(SpringfootError, match=r"step_time_ratio must be .*got 1.3"):
+        usual.paced(1.3)

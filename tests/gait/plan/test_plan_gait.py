@@ -107,6 +107,25 @@ def test_a_search_at_several_speeds_finds_one_style_linear_in_speed(tmp_path):
         assert told and float(told[1]) == pytest.approx(price(BODY, speed, vector)[0], abs=0.02)
 
 
+def test_with_cadence_effort_the_style_sets_step_time_and_length_at_the_same_speed():
+    style = least_work(1.2)
+    usual = plan_walk(BODY, 1.2, style=style)
+    quick = plan_walk(BODY, 1.2, "effort", style=replace(style, step_time_ratio=0.9))
+    assert quick.step_time == 0.9 * usual.step_time and quick.step_length == 0.9 * usual.step_length
+    assert plan_walk(BODY, 1.2, style=replace(style, step_time_ratio=0.9)).step_time == usual.step_time
+    with pytest.raises(SpringfootError, match="cadence 'effort' needs a style, which tells its step time"):
+        plan_walk(BODY, 1.2, "effort")
+
+
+def test_a_search_with_cadence_effort_prices_the_step_time_too():
+    vector = vector_of(replace(least_work(1.2), step_time_ratio=0.95), "effort")
+    assert len(vector) == len(CHOICES) + 1 and style_at(vector, "effort").step_time_ratio == 0.95
+    quick, usual = (
+        price(BODY, 1.2, one, cadence="effort")[0] for one in (vector, vector_of(least_work(1.2), "effort"))
+    )
+    assert usual == price(BODY, 1.2, vector_of(least_work(1.2)))[0] != quick
+
+
 @pytest.mark.parametrize("speeds", [(1.2, 0.9), (1.2, 1.2), ()])
 def test_speeds_of_a_search_ascend(speeds):
     with pytest.raises(SpringfootError, match="speeds must be one or more ascending numbers"):

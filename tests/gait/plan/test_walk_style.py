@@ -119,6 +119,7 @@ def test_the_zmp_of_a_style_goes_as_far_along_a_longer_foot():
         ("walk", "knee", 1e308, r"knee must be a number within ±10, got 1e\+308"),
         ("foot", "roll_power", 0.0, "roll_power must be > 0, got 0"),
         ("foot", "heel_radius", -0.1, "heel_radius must be >= 0 m, got -0.1"),
+        ("walk", "step_time_ratio", 0.0, "step_time_ratio must be > 0, got 0"),
         ("foot", "via_up", [0.1], "via_forward, via_up and via_pitch must be equally many"),
     ],
 )
