@@ -4,7 +4,7 @@
 
 Every observation must be of its space, every reward and every number of the info finite, and the memory flat once the
 tables of speeds and bodies, of which the last few hundred are kept, are full. The tests do it with
-`--steps 100000 --settings 6`: six settings, each walked three times, so that the later times nothing is new.
+`--steps 50000 --settings 6`: six settings, each walked three times, so that the later times nothing is new.
 """
 
 import ctypes
@@ -106,6 +106,8 @@ def drawn_settings(random: np.random.Generator) -> dict[str, Any]:
         "reward_weights": one_of({}, {"alive": 1e6, "grf": 1e6, "stiffness": -1e6, "effort": -1e6}),
     }
     settings["mass"] = float(np.clip(settings["height"] ** 2 * within(13.0, 50.0), 20.0, 250.0))
+    if settings["cadence"] == "people":
+        settings["step_time_ratio"] = one_of(1.0, within(0.8, 1.2))
     if (speeds := maybe(pair(0.4, 2.0))) is not None:
         settings |= {"speed_range": speeds, "speed_interval": one_of(0.04, 2.0), "speed_rate": one_of(0.01, 1e9)}
     return settings

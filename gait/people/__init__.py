@@ -9,7 +9,7 @@ from springfoot.lazy import lazy_names
 if TYPE_CHECKING:
     from .checks import AS_IT_IS
     from .gait_events import CONTACT_THRESHOLD_BW, PERCENT, Contacts, find_contacts, find_steps, on_percent, sample
-    from .human import COLUMNS, HumanGait, human_gait
+    from .human import COLUMNS, STEP_TIME_RATIO_RANGE, HumanGait, human_gait
     from .measured_person import PARTLY, MeasuredPerson, read_person
     from .motion_files import FILE_CURVES
     from .own_data import read_gait
@@ -34,6 +34,7 @@ __all__ = [
     "PARTLY",
     "PERCENT",
     "PUSH_OFF_BEGIN_PERCENT",
+    "STEP_TIME_RATIO_RANGE",
     "Contacts",
     "HumanGait",
     "MeasuredPerson",
@@ -66,6 +67,7 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
             "LOADING_END_PERCENT": "scores",
             "PERCENT": "gait_events",
             "PUSH_OFF_BEGIN_PERCENT": "scores",
+            "STEP_TIME_RATIO_RANGE": "human",
             "Contacts": "gait_events",
             "HumanGait": "human",
             "correlation": "scores",

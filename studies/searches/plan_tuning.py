@@ -25,7 +25,7 @@ from springfoot.arrays import NDArray
 from springfoot.errors import SpringfootError, quoted, require_count, require_number, require_within
 from springfoot.files.writing import csv_text, write_atomically
 from springfoot.gait.body import HEEL_RADIUS, Body
-from springfoot.gait.people import human_gait
+from springfoot.gait.people import STEP_TIME_RATIO_RANGE, HumanGait, human_gait
 from springfoot.gait.plan import (
     AS_IS,
     PER_DEGREE,
@@ -137,6 +137,7 @@ def price(
     weights: tuple[float, ...] = PRICES,
     muscle: Muscle = AS_IS,
     cadence: PlanCadence = "people",
+    human: HumanGait | None = None,
 ) -> tuple[float, WalkPlan | None, Effort | None]:
     """Return the cost of the plan at a vector, the plan and its effort; None for both if the plan is impossible.
 
@@ -147,6 +148,7 @@ def price(
         weights: weights of work, activation, its rate, and acceleration.
         muscle: muscles whose effort counts.
         cadence: step length and time, people's or those of the vector.
+        human: gait in place of people's.
 
     The cost is the weighted effort and a price for a low swing foot, joints beyond their range, and choices beyond
     their bounds.
@@ -156,7 +158,7 @@ def price(
         for (start, unit, least, most), x in zip(CHOICES_OF[cadence].values(), vector, strict=True)
     )
     try:
-        plan = plan_walk(body, speed, cadence, style=style_at(vector, cadence))
+        plan = plan_walk(body, speed, cadence, style=style_at(vector, cadence), human=human)
         effort = effort_of(plan, muscle)
     except SpringfootError:
         return IMPOSSIBLE + PER_UNIT * outside + float(np.linalg.norm(vector)), None, None
@@ -180,6 +182,8 @@ class PlanTuning(Study):
     first and the last, and are linear in speed in between."""
     cadence: PlanCadence = "people"
     """Step length and time of the plans: people's, or those of least effort."""
+    step_time_ratio: float = 1.0
+    """Step time over people's at the same speed, with the cadence `people`."""
     generations: int = 200
     """Generations of the search."""
     population: int = 20
@@ -215,6 +219,9 @@ class PlanTuning(Study):
             require_number(name, getattr(self, name), 0)
         for weight in self.weights:
             require_number("weights", weight, 0)
+        require_number("step_time_ratio", self.step_time_ratio, *STEP_TIME_RATIO_RANGE)
+        if self.cadence != "people" and self.step_time_ratio != 1.0:
+            raise SpringfootError(f"step_time_ratio needs cadence 'people', got {self.cadence!r}")
         for speed in self.speeds:
             require_within("speeds", speed, PLAN_SPEED_RANGE, "m/s")
         if not self.speeds or any(faster <= slower for slower, faster in pairwise(self.speeds)):
@@ -286,8 +293,9 @@ class PlanTuning(Study):
 
     def _price(self, body: Body, speed: float, vector: NDArray) -> tuple[float, WalkPlan | None, Effort | None]:
         """Return cost, plan and effort of `price` at a vector, with the weights and muscles of the flags."""
+        human = None if self.step_time_ratio == 1.0 else human_gait(speed).paced(self.step_time_ratio)
         muscle = Muscle(tissue=self.tissue, tendon=self.tendon, toe_tendon=self.toe_tendon)
-        return price(body, speed, vector, self.weights, muscle, self.cadence)
+        return price(body, speed, vector, self.weights, muscle, self.cadence, human)
 
     def _write_styles(self, styles: dict[float, WalkStyle]) -> None:
         """Write `styles` by speed [m/s], and the command that found them, into the file of styles; those at other

@@ -9,7 +9,7 @@ import pytest
 
 from springfoot.cli.main import main
 from springfoot.errors import SpringfootError
-from springfoot.gait import Body, plan_walk, planned_moments
+from springfoot.gait import Body, human_gait, plan_walk, planned_moments
 from springfoot.gait.body.body import GRAVITY
 from springfoot.gait.body.tissue import passive_moments
 from springfoot.gait.plan.effort import EFFORT_SAMPLES, JOINTS, MOTION_RANGE_DEG, Muscle, effort_of, effort_of_stride
@@ -124,6 +124,27 @@ def test_a_search_with_cadence_effort_prices_the_step_time_too():
         price(BODY, 1.2, one, cadence="effort")[0] for one in (vector, vector_of(least_work(1.2), "effort"))
     )
     assert usual == price(BODY, 1.2, vector_of(least_work(1.2)))[0] != quick
+
+
+def test_a_search_at_another_step_time_prices_plans_of_that_step_time(tmp_path):
+    styles = tmp_path / "styles.json"
+    given = {"generations": 1, "population": 4, "sigma": 0.01, "start": STYLES}
+    text = PlanTuning(step_time_ratio=0.9, styles=styles, **given).ask(lambda _: None).text
+    vector = vector_of(least_work(1.2, styles))
+    at_ratio = price(BODY, 1.2, vector, human=human_gait(1.2).paced(0.9))[0]
+    assert f"1.2 m/s: paid {at_ratio:.2f}" in text and at_ratio != price(BODY, 1.2, vector)[0]
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"step_time_ratio": 0.7}, "step_time_ratio must be .*got 0.7"),
+        ({"step_time_ratio": 0.9, "cadence": "effort"}, "step_time_ratio needs cadence 'people', got 'effort'"),
+    ],
+)
+def test_a_step_time_that_cannot_be_held_is_refused(given, said):
+    with pytest.raises(SpringfootError, match=said):
+        PlanTuning(**given).check()
 
 
 @pytest.mark.parametrize("speeds", [(1.2, 0.9), (1.2, 1.2), ()])
