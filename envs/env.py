@@ -121,8 +121,9 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
     | 41  | command_speed           | sqrt(g l)   | 0    | 2   | commanded speed (Froude speed)            |
     | 42  | height_ratio            | 1           | 0    | 2   | height / 1.70 m                           |
 
-    Where the action moves the person, 37 further entries tell the last offsets, whether the action sets the stiffness,
-    the slope, the stiffness now, and what feet and body are: `springfoot.envs.task.observation_entries`.
+    Where the action moves the person, 38 further entries tell the last offsets, whether the action sets the stiffness,
+    the slope, the stiffness now, feet and body, and the length of the planned steps
+    (`springfoot.envs.task.observation_entries`).
 
     ## Rewards
     Sum of weight x term. All terms are dimensionless and stand unweighted in `info`. On the step of a fall the reward
@@ -221,7 +222,7 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
     | `speed_rate`              | `0.25`          | rate at which it goes to a new one [m/s^2]                         |
     | `step_time_ratio`         | `1.0`           | step time over people's at the same speed, 0.8 to 1.2              |
     | **reference**             |                 |                                                                    |
-    | `cadence`                 | `"people"`      | step length and time of `"people"`, `"thesis"` or least `"effort"` |
+    | `cadence`                 | `"people"`      | steps of `"people"`, the `"thesis"`, or least `"effort"`           |
     | `guide`                   | `"people"`      | target of the walk: `"people"`, or its own `"plan"`                |
     | `people_file`             | `None`          | file of people's data in place of the package's, in its form       |
     | `plan_file`               | `None`          | the plan's style and leg constants in place of the package's       |

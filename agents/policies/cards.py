@@ -16,26 +16,26 @@ LEARNED_2_BY = "`, then `".join(
 )
 """Commands that made `learned-2` from `learned`."""
 LEARNED_3_BY = (
-    "springfoot train --preset person --begin-from learned`, then three times more from what came of it, with the "
-    "settings in `docs/results/csv/learned_3.json"
+    "`springfoot train --preset person --begin-from learned`, then three times more from what came of it, with the "
+    "settings in `docs/results/csv/learned_3.json`"
 )
 """Commands that made `learned-3` from `learned`."""
 MADE = {
-    "pretrained": ("Walks on level ground at 1.2 m/s, and goes on when it is pushed.", PRETRAINED_BY, "walk"),
+    "pretrained": ("Walks on level ground at 1.2 m/s, and goes on when it is pushed.", f"`{PRETRAINED_BY}`", "walk"),
     "medium": (
         "Walks, and lags behind when pushed: a training stopped early, for sets of offline learning.",
-        "springfoot train --push-newton 250 --timesteps 500000 --out runs/medium",
+        "`springfoot train --push-newton 250 --timesteps 500000 --out runs/medium`",
         "walk",
     ),
-    "predicted": ("Walks by a plan that knows no person's curves.", "springfoot study predict", "prediction"),
+    "predicted": ("Walks by a plan that knows no person's curves.", "`springfoot study predict`", "prediction"),
     "learned": (
         "Moves hips, knees and ankles too, on any foot, body, speed and slope that it drew; the preset draws more now.",
-        "springfoot train --preset person",
+        "`springfoot train --preset person`, when the preset had the settings below",
         "feet",
     ),
     "learned-2": (
         "Went on from `learned`: falls less, holds speed better, works a little more; knees are farther from people's.",
-        LEARNED_2_BY,
+        f"`{LEARNED_2_BY}`, when the preset had the settings of `learned`",
         "feet",
     ),
     "learned-3": (
@@ -73,7 +73,7 @@ def policy_card(name: str) -> str:
     differences = ", ".join(f"{key} {value}" for key, value in changed.items())
     legs = ", for each leg, the right one's mirrored" if policy.mirror is not None else ""
     lines = [
-        f"made by: `{command}`",
+        f"made by: {command}",
         f"results and falls: docs/results/{page}.md",
         f"network: {layers}, {policy.activation}{legs}; observations to {ACTED_ON[policy.settings.acts]}",
         f"settings of its training, where not the defaults: {differences or 'none'}",

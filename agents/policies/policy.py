@@ -257,6 +257,10 @@ def read_policy(name: str | Path) -> Policy:
         raise SpringfootError(f"{name}: observation_clip must be in (0, {LARGEST_WEIGHT:g}] or null, is {clip:g}")
     mirror = mirror_of(biped.observation_names, biped.action_names) if mirrored else None
     ends = (len(biped.observation_names), len(biped.action_names) // (2 if mirrored else 1))
+    if mirrored and len(sizes) > 1 and sizes[0] != ends[0]:
+        raise SpringfootError(
+            f"{name} observes {sizes[0]!r} numbers, its environment in this version tells {ends[0]}: train it again"
+        )
     if len(sizes) < 2 or (sizes[0], sizes[-1]) != ends:
         actions = "the actions of one leg" if mirrored else "action"
         raise SpringfootError(f"{name}: its layers {sizes} do not lead from observation to {actions}")

@@ -181,12 +181,12 @@ PERSON_TASK = replace(
     push_newton=100.0,
     height_range=(1.45, 1.95),
     mass_range=(45.0, 97.0),
-    speed_range=(0.75, 1.66),  # at 1.15 of people's step time the shortest body has no longer legs
+    speed_range=(0.75, 1.66),  # faster walks at 1.15 of people's step time need longer legs
     speed_interval=5.0,
     slope_range_deg=(-5.0, 5.0),
     unevenness_m=0.005,
     reward_weights={
-        "alive": 40.0,  # about all prices together where a body first walks: with less it learns to fall
+        "alive": 40.0,  # about what all prices take at first: with less it learns to fall
         "speed": 0.5,
         "com_x": 0.2,
         "com_z": 0.0,
@@ -230,7 +230,7 @@ PRESETS: dict[str, TrainingConfig] = {
         update_steps=15_360,
         minibatches=12,
         epochs=5,
-        learning_rate_end=0.02,  # at a small spread of actions larger steps undo what was learned
+        learning_rate_end=0.02,  # when the spread of actions is small a high rate undoes what was learned
         gamma=0.99,
         log_std=-1.2,
         hidden=(128, 128),

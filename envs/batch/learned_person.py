@@ -140,12 +140,19 @@ def _action_names(settings: dict[str, Any]) -> tuple[str, ...]:
 def _read_person(path: Path) -> tuple[dict[str, Any], dict[str, Any], dict[str, NDArray]]:
     """Return network and settings of a person's header, and its tensors; raise `SpringfootError` for another file."""
     header, tensors = read_tensors(path, "springfoot", "policy", POLICY_ENTRIES)
+    observed = len(PERSON_NAMES)
     try:
         network = header["network"]
         settings = header["settings"]
+        if settings["acts"] in ("both", "person"):
+            observed = int(network["layer_sizes"][0])
         fits = _is_person(network, settings, tensors)
     except (KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError):
         fits = False
+    if observed != len(PERSON_NAMES):
+        raise SpringfootError(
+            f"{path} observes {observed} numbers, a person of this version {len(PERSON_NAMES)}: train it again"
+        )
     if not fits:
         raise SpringfootError(
             f"{path} is no person: it must be a mirrored policy of tanh layers, trained with acts 'both' or 'person'"

@@ -137,7 +137,8 @@ def leg_constants(
     table = _package_constants()
     if follows_plan and name not in table:
         raise SpringfootError(
-            f"there are no tuned leg constants for guide 'plan' and cadence {cadence!r}; it must be 'people'"
+            f"there are no tuned leg constants for guide 'plan' and cadence {cadence!r}; "
+            "it must be 'people' or 'effort'"
         )
     if name not in table:
         raise SpringfootError(

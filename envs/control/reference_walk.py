@@ -63,8 +63,13 @@ def reference_walks(settings: BipedSettings, legs: Sequence[LegConstants] | None
     `legs` are leg constants in place of the committed ones, the same at every speed. Raises `SpringfootError` for a
     walk that cannot be planned, with its speed and the settings that ask for it.
     """
-    ranges = {"height_range": settings.height_range, "speed_range": settings.speed_range}
-    asked = " and ".join(f"{name} {value}" for name, value in ranges.items() if value is not None)
+    ratio = settings.step_time_ratio if settings.step_time_ratio != 1.0 else None
+    given = {
+        "height_range": settings.height_range,
+        "speed_range": settings.speed_range,
+        "step_time_ratio": ratio,
+    }
+    asked = " and ".join(f"{name} {value}" for name, value in given.items() if value is not None)
     walks = []
     for speed in tabulated_speeds(settings):
         constants = legs or _tuned_constants(settings, speed)

@@ -61,9 +61,11 @@ def check_people_file(name: object) -> None:
 
 def check_guide(follows_plan: bool, human: object, plan_file: object, cadence: str) -> None:
     """Refuse the setting `human` with guide `plan` (`follows_plan`), `plan_file` and cadence `effort` with guide
-    `people`."""
+    `people`, and that cadence without a `plan_file`."""
     if cadence == "effort" and not follows_plan:
         raise SpringfootError("cadence 'effort' needs guide 'plan', got 'people'")
+    if cadence == "effort" and plan_file is None:
+        raise SpringfootError("cadence 'effort' needs a plan_file, whose styles tell the step time")
     if follows_plan and human is not None:
         raise SpringfootError("human must be None with guide 'plan': the plan replaces human data")
     if plan_file is not None:

@@ -163,14 +163,14 @@ class BipedSettings:
     speed_rate: float = field(default=0.25, metadata=_SPEED | _KEPT)
     """Rate at which the commanded speed goes to a new one [m/s^2]."""
     step_time_ratio: float = field(default=1.0, metadata=_SPEED)
-    """Step time over people's at the same speed [0.8..1.2]; the step length changes likewise. It needs the cadence
-    `people`."""
+    """Step time over people's at the same speed [0.8..1.2]; the step length changes likewise. Legs are too short for
+    long steps at high speeds. It needs the cadence `people`."""
     cadence: Cadence = field(default="people", metadata=_REFERENCE)
-    """Step length and time: as people choose them at this speed, the thesis's 0.6 m and 0.5 s, or with guide `plan`
-    those of least effort."""
+    """Step length and time: as people choose them at this speed, the thesis's 0.6 m and 0.5 s, or those of the styles
+    in `plan_file` (effort)."""
     guide: Guide = field(default="people", metadata=_REFERENCE)
     """Target of controller, feed-forward, start and reward: people's walk (people); or the plan's own (plan), with
-    people's step length and time alone (`docs/results/prediction.md`)."""
+    people's step length and time alone, or the plan's (`docs/results/prediction.md`)."""
     people_file: str | None = field(default=None, metadata=_REFERENCE)
     """File of people's data in place of `human_harmonics.json` of `springfoot.gait`, in the same form."""
     plan_file: str | None = field(default=None, metadata=_REFERENCE)

@@ -83,7 +83,7 @@ def submit(policy: str, task: str, name: str, out: Path | None, threads: int) ->
     _require_name(name)
     policy_on_task(policy, task)  # one that the task does not take
     content = None if is_baseline(policy) else read_bytes(find_policy(policy), MOST_POLICY_BYTES)
-    digest = sha256(policy.encode() if content is None else content).hexdigest()
+    digest = _digest_of(policy, content)
     walks = walk_publicly(policy, task, threads)
     values = {
         "name": name,
@@ -102,6 +102,11 @@ def submit(policy: str, task: str, name: str, out: Path | None, threads: int) ->
             (part / POLICY).write_bytes(content)
     path = policy if content is None else str(folder / POLICY)
     return Submission(folder=folder, name=name, task=task, policy=path, digest=digest, walks=walks)
+
+
+def _digest_of(policy: str, content: bytes | None) -> str:
+    """Return the SHA-256 digest of a policy: of its file's `content`, or of the name of a baseline."""
+    return sha256(policy.encode() if content is None else content).hexdigest()
 
 
 def read_submission(folder: Path) -> Submission:
@@ -126,9 +131,9 @@ def read_submission(folder: Path) -> Submission:
         raise SpringfootError(f"{path} is no submission: a return must be within ±{LARGEST_RETURN:g}")
     if policy == POLICY:
         policy = str(folder / POLICY)
-        found = sha256(read_bytes(Path(policy), MOST_POLICY_BYTES)).hexdigest()
+        found = _digest_of(policy, read_bytes(Path(policy), MOST_POLICY_BYTES))
     elif is_baseline(policy):
-        found = sha256(policy.encode()).hexdigest()
+        found = _digest_of(policy, None)
     else:
         raise SpringfootError(f"{path} names the policy {quoted(policy)}: allowed are {POLICY} and baselines")
     if found != digest:

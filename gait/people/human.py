@@ -73,7 +73,8 @@ HABITS = {
 }
 """Numbers for the foot's springs -> how many, and their range; chosen."""
 STEP_TIME_RATIO_RANGE = (0.8, 1.2)
-"""Step times over people's at the same speed [-]; chosen: people were measured at these (Umberger & Martin 2007)."""
+"""Step times over people's at the same speed [-]; chosen: people were measured at stride rates up to 20 % off their
+own (Umberger & Martin 2007)."""
 PEOPLE_FILE = Path(str(resources.files("springfoot.gait.people") / "human_harmonics.json"))
 """The package's own file."""
 

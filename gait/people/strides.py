@@ -168,7 +168,7 @@ def merge_trials(trials: Sequence[Trial]) -> MeasuredWalk:
     heading = -1.0 if any(trial.backward for trial in trials) else 1.0  # often another file's than the forces'
     for trial in trials:
         for side, curves in trial.legs.items():
-            for curve in curves.keys() - legs.get(side, {}).keys():
+            for curve in [curve for curve in curves if curve not in legs.get(side, {})]:
                 along_x = trial.forces_along_x and curve == "grf_forward"
                 values = heading * curves[curve] if along_x else curves[curve]
                 legs.setdefault(side, {})[curve] = np.interp(time, trial.time, values)

@@ -244,7 +244,7 @@ def plan_walk(
 
 
 def _step_time_and_length(body: Body, speed: float, cadence: str, human: HumanGait) -> tuple[float, float]:
-    """Return step time [s] and step length [m] of the thesis's cadence, or people's for any other, at `speed` [m/s].
+    """Return step time [s] and step length [m] at `speed` [m/s]: the thesis's with that cadence, people's with others.
 
     `human` gives those of people at the nearest speed of their data.
     """

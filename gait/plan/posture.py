@@ -242,7 +242,7 @@ def refuse_impossible_legs(body: Body, legs: LegPostures) -> None:
     if below > LOWEST_HIP * body.leg_length:
         raise SpringfootError(
             f"legs too short for this step: the hip would be {below:.3f} m below standing on average, "
-            f"{below - LOWEST_HIP * body.leg_length:.3f} m more than allowed"
+            f"{1000 * (below - LOWEST_HIP * body.leg_length):.1f} mm more than allowed"
         )
     bent = degrees(float(legs.knee.max()))
     if bent > DEEPEST_KNEE_DEG:

@@ -1,12 +1,13 @@
 """Test a learned person: a network in the step."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from springfoot.agents.policies.fingerprint import fingerprint
-from springfoot.agents.policies.policy import Policy, save_policy
+from springfoot.agents.policies.policy import Policy, read_policy, save_policy
 from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.batch.learned_person import PERSON_NAMES, LearnedPerson
 from springfoot.envs.physics.model import ACTIONS
@@ -120,6 +121,17 @@ def test_a_file_that_is_no_person_is_one_line(file, tmp_path) -> None:
         with pytest.raises(SpringfootError, match=message) as error:
             Biped(with_person(name), 1)
         assert "\n" not in str(error.value)
+    old = person()  # of an environment that told less
+    old = replace(
+        old,
+        weights=(old.weights[0][:, 1:], *old.weights[1:]),
+        observation_mean=old.observation_mean[1:],
+        observation_variance=old.observation_variance[1:],
+    )
+    save_policy(plain, old)
+    for read in (lambda: Biped(with_person(str(plain)), 1), lambda: read_policy(plain)):
+        with pytest.raises(SpringfootError, match=r"observes 80 numbers, .* version .*81: train it again"):
+            read()
     with pytest.raises(SpringfootError, match="was trained with guide 'people', not 'plan'"):
         Biped(with_person(file, guide="plan"), 1)
 

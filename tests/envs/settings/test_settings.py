@@ -119,6 +119,7 @@ BAD = [
     ({"equilibrium": ["planned"]}, ["equilibrium", "'planned'"]),
     ({"equilibrium": "phase"}, ["phase", "schedule"]),
     ({"cadence": "effort"}, ["cadence 'effort' needs guide 'plan', got 'people'"]),
+    ({"cadence": "effort", "guide": "plan"}, ["cadence 'effort' needs a plan_file, whose styles tell the step time"]),
     ({"step_time_ratio": 1.3}, ["step_time_ratio", "0.8", "1.2", "got 1.3"]),
     ({"step_time_ratio": 0.9, "cadence": "thesis"}, ["step_time_ratio needs cadence 'people', got 'thesis'"]),
     (
