@@ -130,6 +130,10 @@ def test_what_is_not_allowed_is_refused_in_one_clear_line(attempt, words):
             {"height_range": (1.0, 2.3), "speed_range": (0.4, 2.0)},
             r"^no walk of 1\.7 m at 2\.5 m/s, asked for by height_range \(1\.0, 2\.3\) and speed_range ",
         ),
+        (
+            {"speed": 1.7, "drawn_bodies": [{}, {"step_time_ratio": 1.2}]},
+            r"^no walk of 1\.7 m at 1\.7 m/s, asked for by step_time_ratio 1\.2: legs too short for this step: ",
+        ),
     ],
 )
 def test_a_body_too_short_for_a_speed_is_told_with_the_settings_that_ask_for_it(values, said):
