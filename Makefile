@@ -16,7 +16,7 @@ PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest --numprocesses auto -
 help:
 	@echo "make walk     train with the defaults, then evaluate what was trained (results in runs/)"
 	@echo "make test     run the quick tests, in four minutes on two cores"
-	@echo "make test-all run all tests, those marked slow too (trainings, kills, studies twice): eleven minutes on two cores"
+	@echo "make test-all run all tests, those marked slow too (trainings, kills, studies twice): nine minutes on two cores"
 	@echo "make test-wheel  build the wheel and with it alone, in an empty folder: all commands of README, examples, policies"
 	@echo "make test-sdist  build the source distribution, and run its tests in an empty folder"
 	@echo "make test-lowest run the quick tests with the lowest versions that pyproject.toml allows"
