@@ -189,8 +189,7 @@ def toe_angle(feet: FootPath, human: HumanGait, phase: NDArray) -> NDArray:
     landing = in_air * feet.pitch(phase) / feet.heel_strike_pitch
     rolling = feet.toe_pitch(phase) - feet.pitch(phase)
     # The bend at toe-off fades within the first third of swing.
-    swing_phase = (phase - feet.toe_off) / (1 - feet.toe_off)
-    remaining = np.clip(1 - 3 * swing_phase, 0.0, 1.0)
+    remaining = np.clip(1 - 3 * (phase - feet.toe_off) / (1 - feet.toe_off), 0.0, 1.0)
     swinging = in_air + remaining**2 * (feet.toe_off_pitch - feet.roll_pitch - at_toe_off)
     # Early in swing people's angle would take the tip into the floor: bend the toe up until its tip is at floor level.
     lifted = feet.ball_clearance(phase) + feet.body.toe_joint_height * (1 - cos(feet.roll_pitch))
