@@ -35,7 +35,7 @@ MADE = {
     ),
     "learned-2": (
         "Went on from `learned`: falls less, holds speed better, works a little more; knees are farther from people's.",
-        f"`{LEARNED_2_BY}`, when the preset had the settings of `learned`",
+        f"`{LEARNED_2_BY}`, when the preset had the other settings below",
         "feet",
     ),
     "learned-3": (
