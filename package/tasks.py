@@ -12,8 +12,8 @@ VERSION = "v0"
 """Version of every task."""
 SECONDS = 10.0
 """Length of an episode [s]."""
-HOW_IT_ACTS = ("action_mode",)
-"""Settings that stay a policy's own on every task: how its action becomes a stiffness."""
+HOW_IT_ACTS = ("action_mode", "aim_rate")
+"""Settings that stay a policy's own on every task: how its action becomes a stiffness, how it holds a speed."""
 MUST_AGREE = (
     "acts",
     "guide",

@@ -121,8 +121,9 @@ class Biped(ExactState):
             one_way=self._worn.one_way,
             loaded=any(of_body.carried_ratio > 0.0 for of_body in settings_of_bodies(settings)),
         )
-        self._person = PersonActions(settings, self.subjects.rows)
         self._learned = None if settings.person == "tuned" else LearnedPerson(settings.person, settings.guide)
+        aim_rate = settings.aim_rate if self._learned is None else self._learned.aim_rate
+        self._person = PersonActions(settings, self.subjects.rows, aim_rate)
         self._task = Task(settings, table_rows, self.subjects, self._simulation.feet)
         self._ground = Ground(settings, self._simulation, self.subjects, self._task.rows)
         self._noise = SensorNoise(settings.sensor_noise, self._task.rows)

@@ -18,7 +18,7 @@ from springfoot.files.tensor_file import digest_of_file, read_tensors
 
 from ..physics.kernel import kernel
 from ..physics.model import ACTIONS, MOVED, PERSON_ACTIONS, SIDES
-from ..settings.settings import FARTHEST_OFFSET_DEG
+from ..settings.settings import FARTHEST_OFFSET_DEG, FASTEST_AIM
 from ..task.mirror import mirror_of
 from ..task.observation_entries import PERSON_OBSERVATION
 
@@ -101,6 +101,8 @@ class LearnedPerson:
         if settings.get("guide", "people") != guide:
             raise SpringfootError(f"person {name!r} was trained with guide {settings.get('guide')!r}, not {guide!r}")
         self._scale = radians(settings["person_range_deg"])
+        self.aim_rate: float = settings.get("aim_rate", 0.0)
+        """Its setting `aim_rate` [1/s]."""
         mirror = mirror_of(PERSON_NAMES, _action_names(settings))
         layers = range(len(network["layer_sizes"]) - 1)
         clip = np.inf if network["observation_clip"] is None else float(network["observation_clip"])
@@ -183,4 +185,5 @@ def _is_person(network: dict[str, Any], settings: dict[str, Any], tensors: dict[
         and 0.0 < float(network["variance_floor"]) <= LARGEST_OF_PERSON
         and (clip is None or 0.0 < float(clip) <= LARGEST_OF_PERSON)
         and 0.0 <= float(settings["person_range_deg"]) <= FARTHEST_OFFSET_DEG
+        and 0.0 <= float(settings.get("aim_rate", 0.0)) <= FASTEST_AIM
     )

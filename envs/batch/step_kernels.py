@@ -21,6 +21,7 @@ import numpy as np
 from springfoot.arrays import NDArray
 
 from ..control.legs import drive
+from ..control.person_actions import move_aim
 from ..control.stiffness_control import move, stiffen
 from ..control.stride_phase import advance
 from ..physics.kernel import kernel, part
@@ -149,6 +150,7 @@ def end_step(controls, tasks, physics, forces, target, task, walking, running, o
     any_terminated = end_episodes(
         tasks, terms[:, ALIVE], running, task[0].most_steps, outcome.terminated, outcome.truncated
     )
+    move_aim(controls, bodies, task[0].seconds, walking, running)
     for i in range(len(running)):
         if running[i]:
             bodies[i].muscles.judged = 1  # the sums of the muscles' work begin anew in the next window

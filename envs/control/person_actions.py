@@ -1,7 +1,8 @@
 """Let a person act: offsets to the rest angles of hips, knees and ankles; and name the source of the stiffness.
 
 The offsets are added to the rest angles that the leg constants give, every 20 ms. They are 0 while the body stands, and
-do nothing at an ankle with a rest angle or a device of its own.
+do nothing at an ankle with a rest angle or a device of its own. A person that walks more slowly than commanded aims at
+ever more speed, and one that walks faster at less: the commanded speed that it observes is the one that it aims at.
 """
 
 from collections.abc import Sequence
@@ -11,6 +12,7 @@ import numpy as np
 
 from springfoot.arrays import NDArray
 
+from ..physics.kernel import part
 from ..physics.model import MOVED, SIDES
 from ..settings.settings import BipedSettings
 
@@ -19,6 +21,28 @@ SOFTEST_CONSTANT = -0.5
 below which no walk was found."""
 DRAWN_SOURCES = ("scaled", "constant", "random")
 """Sources of the stiffness that `stiffness_by` "drawn" takes where the action does not set it."""
+FARTHEST_AIM = 0.2
+"""Most that a person aims above or below the commanded speed [m/s]; chosen: more than persons were too slow by."""
+
+
+@part
+def move_aim(controls, bodies, seconds, walking, running) -> None:
+    """Move the speed that each person aims at by what its CoM lacked of the commanded speed in a step.
+
+    Args:
+        controls: (N,) of `CONTROL_ROW`; `person` is changed.
+        bodies: (N,) of `BODY_ROW`, as measured at the step's end.
+        seconds: time of the step.
+        walking: (N,) bool, bodies that neither stand nor have ended.
+        running: (N,) bool, bodies that took the step; those that stand aim at the commanded speed.
+    """
+    for i in range(len(controls)):
+        person = controls[i].person
+        if walking[i]:
+            lacking = controls[i].subject.speed - bodies[i].measured.com_velocity[0]
+            person.aim = min(max(person.aim + person.aim_rate * seconds * lacking, -FARTHEST_AIM), FARTHEST_AIM)
+        elif running[i]:
+            person.aim = 0.0
 
 
 def draw_source(settings: BipedSettings, random: np.random.Generator) -> tuple[int, int, int, NDArray]:
@@ -47,20 +71,24 @@ class PersonActions:
     Args:
         settings: range of the offsets, source of the stiffness.
         rows: (N,) of `CONTROL_ROW`; `person` and `source` are changed.
+        aim_rate: as the setting.
     """
 
-    def __init__(self, settings: BipedSettings, rows: NDArray) -> None:
+    def __init__(self, settings: BipedSettings, rows: NDArray, aim_rate: float) -> None:
         self._settings = settings
         self._range = radians(settings.person_range_deg)
         self._source = rows["source"]
         self._offset = rows["person"]["offset"]
         self._last_offset = rows["person"]["last_offset"]
+        self._aim = rows["person"]["aim"]
+        rows["person"]["aim_rate"] = aim_rate
         self._others_may = settings.stiffness_by != "action" or settings.acts == "person"
 
     def reset(self, ids: NDArray, randoms: Sequence[np.random.Generator]) -> None:
         """Begin an episode of bodies `ids` (K,), each drawing with its generator in `randoms` (K,)."""
         self._offset[ids] = 0.0
         self._last_offset[ids] = 0.0
+        self._aim[ids] = 0.0
         if self._others_may:
             for index, random in zip(ids.tolist(), randoms, strict=True):
                 self._source[index] = draw_source(self._settings, random)

@@ -49,6 +49,8 @@ PERSON = np.dtype(
     [
         ("offset", float, (len(SIDES), len(MOVED))),  # of the rest angles of hip, knee and ankle [rad]
         ("last_offset", float, (len(SIDES), len(MOVED))),  # that of the step before [rad]
+        ("aim", float),  # speed that it aims at beyond the commanded one [m/s]
+        ("aim_rate", float),  # at which it aims beyond it while it walks too slowly [1/s]
     ]
 )
 """The person of one environment (`envs.control.person_actions`)."""

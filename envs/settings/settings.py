@@ -82,6 +82,8 @@ LONGEST_DELAY = 0.04
 
 FARTHEST_OFFSET_DEG = 30.0
 """Largest offset of a rest angle that the setting `person_range_deg` takes [deg]; chosen."""
+FASTEST_AIM = 5.0
+"""Largest setting `aim_rate` [1/s]; chosen: a fifth of a second, a third of a step."""
 TENDON_RANGE = (100.0, 2000.0)
 """Stiffness of a tendon that the setting `ankle_tendon` takes [N m/rad]; chosen: a fourth and five times people's."""
 DEFAULT_WEIGHTS = {
@@ -208,6 +210,9 @@ class BipedSettings:
     `springfoot train --preset person`."""
     person_range_deg: float = field(default=14.0, metadata=_PERSON)
     """Largest offset of a rest angle, that of an action of 1 [0..30 deg]."""
+    aim_rate: float = field(default=0.0, metadata=_PERSON)
+    """Rate at which a person that walks too slowly aims at more than the commanded speed, one too fast at less [0..5
+    1/s]; the person observes the speed that it aims at, at most 0.2 m/s from the commanded one."""
     stiffness_by: StiffnessBy = field(default="action", metadata=_PERSON | _REPLACED)
     """Who sets the stiffness where the action moves the person: the action, with `acts` `person` the fixed schedule;
     that schedule always (schedule); the schedule times a
@@ -349,6 +354,7 @@ class BipedSettings:
     def _check_person(self) -> None:
         """Raise `SpringfootError` for `person`, `acts`, `stiffness_by` and `decisions` that do not go together."""
         require_number("person_range_deg", self.person_range_deg, 0.0, FARTHEST_OFFSET_DEG, unit="deg")
+        require_number("aim_rate", self.aim_rate, 0.0, FASTEST_AIM, unit="1/s")
         if not isinstance(self.person, str) or not self.person:
             raise SpringfootError(f"person must be 'tuned' or the name of a policy file, got {quoted(self.person)}")
         if self.acts == "stiffness":

@@ -119,6 +119,7 @@ def observe(rows, controls, bodies, table, observation) -> None:
             for contact in range(3):
                 seen.load[side, contact] = row.force[side, contact, 1]  # [1]: upward
         if count > _SHORT:
+            seen.command[0] += control.person.aim
             seen.own_stiffness = 1 - control.source.not_action
             seen.slope = control.subject.slope
             for k in range(len(seen.worn)):

@@ -113,4 +113,5 @@ OBSERVATION = _entries()
 body and load. No entry shows the mass of the body, as mechanics scale with it (`envs.physics.model`)."""
 PERSON_OBSERVATION = OBSERVATION + _person_entries()
 """Every entry of the observation where the action moves the person: `OBSERVATION`, and the entries of a person.
-Stiffness is over that unit at 1.70 m and 63 kg, scaled with mass x height."""
+The commanded speed is the one that the person aims at (setting `aim_rate`). Stiffness is over that unit at 1.70 m and
+63 kg, scaled with mass x height."""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from springfoot.envs.batch.biped_batch import Biped
-from springfoot.envs.control.person_actions import DRAWN_SOURCES
+from springfoot.envs.control.person_actions import DRAWN_SOURCES, FARTHEST_AIM
 from springfoot.envs.physics.model import ACTIONS, ANKLE, HIP, KNEE, PERSON_ACTIONS
 from springfoot.envs.settings.settings import BipedSettings
 from springfoot.envs.task.observation_entries import OBSERVATION, PERSON_OBSERVATION
@@ -155,6 +155,7 @@ def test_alone_as_in_a_batch_and_from_a_kept_state_to_the_bit() -> None:
         ),
         ({"stiffness_by": "schedule"}, "stiffness_by 'schedule' needs acts 'person' or 'both'"),
         ({"person_range_deg": 40.0}, "person_range_deg must be"),
+        ({"aim_rate": -1.0}, "aim_rate must be"),
     ],
 )
 def test_bad_settings_are_one_line(settings: dict, message: str) -> None:
@@ -168,3 +169,30 @@ def test_a_standing_body_has_no_offsets() -> None:
     biped = started(BipedSettings(acts="both", start="standing"))
     biped.step(np.ones((1, 10)))
     assert not biped.subjects.rows["person"]["offset"].any()
+
+
+def test_a_person_aims_at_the_speed_that_it_lacks_within_bounds() -> None:
+    biped = started(BipedSettings(acts="both", aim_rate=2.0))
+    unit = np.sqrt(9.81 * biped.body.leg_length)
+    aims, expected = [], 0.0
+    for _ in range(100):
+        observation = biped.step(np.zeros((1, 10))).observation
+        lacking = biped.settings.speed - biped.measurement.com_velocity[0, 0]
+        expected = np.clip(expected + 2.0 * biped.dt * lacking, -FARTHEST_AIM, FARTHEST_AIM)
+        aims.append(float(biped.subjects.rows["person"]["aim"][0]))
+        assert aims[-1] == pytest.approx(expected, abs=1e-12)
+        seen = float(observation[0, NAMES.index("command_speed")]) * unit
+        assert seen == pytest.approx(biped.settings.speed + aims[-1], abs=1e-6)
+    assert np.ptp(aims) > 0.01
+
+
+def test_the_aim_rests_on_the_commanded_speed_while_a_body_stands_and_at_a_reset() -> None:
+    biped = started(BipedSettings(acts="both", aim_rate=2.0, start="standing"))
+    for _ in range(20):
+        biped.step(np.zeros((1, 10)))
+    assert biped.subjects.rows["person"]["aim"][0] == 0.0
+    walking = started(BipedSettings(acts="both", aim_rate=2.0))
+    walking.step(np.zeros((1, 10)))
+    assert walking.subjects.rows["person"]["aim"][0] != 0.0
+    walking.reset(np.arange(1), [1])
+    assert walking.subjects.rows["person"]["aim"][0] == 0.0
