@@ -19,8 +19,10 @@ from ..settings.settings import BipedSettings
 SOFTEST_CONSTANT = -0.5
 """Action of the softest stiffness that is drawn as a constant [-]; chosen: 50 and 12.6 N m/rad with the default ranges,
 below which no walk was found."""
-DRAWN_SOURCES = ("scaled", "constant", "random")
-"""Sources of the stiffness that `stiffness_by` "drawn" takes where the action does not set it."""
+DRAWN_SOURCES = {"action": 0.6, "scaled": 0.18, "constant": 0.18, "random": 0.04}
+"""Source of the stiffness that `stiffness_by` "drawn" takes -> its share; chosen: walks on a stiffness drawn anew in
+every step cost three times the energy of others and little that a person can spare, so that many of them hide from
+a training what others could spare."""
 FARTHEST_AIM = 0.2
 """Most that a person aims above or below the commanded speed [m/s]; chosen: more than persons were too slow by."""
 
@@ -52,7 +54,7 @@ def draw_source(settings: BipedSettings, random: np.random.Generator) -> tuple[i
     """
     source = settings.stiffness_by
     if source == "drawn":
-        source = "action" if random.random() < 0.5 else DRAWN_SOURCES[random.integers(len(DRAWN_SOURCES))]
+        source = random.choice(list(DRAWN_SOURCES), p=list(DRAWN_SOURCES.values()))
     if source == "action" and settings.acts == "person":
         source = "schedule"
     drawn = np.zeros(4)

@@ -148,6 +148,7 @@ class Persons(WalkingStudy):
                 acts=settings.acts,
                 stiffness_by="action",
                 person_range_deg=settings.person_range_deg,
+                aim_rate=settings.aim_rate,
                 speed_interval=None,
                 episode_seconds=self.seconds,
             )

@@ -94,7 +94,7 @@ def test_a_person_sees_the_feet_the_last_offsets_and_the_stiffness() -> None:
     assert told["own_stiffness"] == 1.0
 
 
-@pytest.mark.parametrize("source", ["schedule", *DRAWN_SOURCES])
+@pytest.mark.parametrize("source", ["schedule", "scaled", "constant", "random"])
 def test_others_set_the_stiffness_and_the_action_is_read_as_none(source: str) -> None:
     settings = BipedSettings(acts="both", action_mode="residual", stiffness_by=source)  # type: ignore[arg-type]
     biped = started(settings, 2)
@@ -122,10 +122,18 @@ def test_a_constant_stiffness_stays_and_a_random_one_changes() -> None:
     assert np.ptp(kinds["scaled"]) > 0.0
 
 
-def test_a_drawn_source_is_the_action_in_half_of_the_episodes() -> None:
-    biped = started(BipedSettings(acts="both", stiffness_by="drawn"), 400)
-    own = biped.controlled.all(axis=(1, 2))
-    assert 160 <= own.sum() <= 240
+def test_each_source_is_drawn_in_its_share_of_the_episodes() -> None:
+    episodes = 1000
+    source = started(BipedSettings(acts="both", stiffness_by="drawn"), episodes).subjects.rows["source"]
+    drawn = {
+        "action": source["not_action"] == 0,
+        "scaled": source["scheduled"] == 1,
+        "constant": (source["not_action"] == 1) & (source["scheduled"] == 0) & (source["anew"] == 0),
+        "random": source["anew"] == 1,
+    }
+    for name, share in DRAWN_SOURCES.items():
+        assert drawn[name].sum() == pytest.approx(share * episodes, abs=4 * np.sqrt(share * (1 - share) * episodes))
+    assert sum(DRAWN_SOURCES.values()) == pytest.approx(1.0)
 
 
 def test_alone_as_in_a_batch_and_from_a_kept_state_to_the_bit() -> None:
