@@ -176,19 +176,51 @@ def test_effort_is_the_plans_price_of_peoples_curves(gait):
             assert sum(part[name] for part in parts.values()) == pytest.approx(effort[name])
 
 
-def test_work_on_the_com_is_that_of_each_legs_force_in_double_support(gait):
-    phase = np.linspace(0.0, gait.metrics["double_support_s"] / HUMAN.stride_time, 1000)  # of the leading leg
+@pytest.mark.parametrize("slope_deg", [0.0, 4.0])
+def test_work_on_the_com_is_that_of_each_legs_force_in_double_support(slope_deg):
+    metrics = measure(people(slope_deg=slope_deg)).metrics
+    phase = np.linspace(0.0, metrics["double_support_s"] / HUMAN.stride_time, 1000)  # of the leading leg
     velocity = np.stack([np.full_like(phase, SPEED), 0.08 * np.pi / HUMAN.stride_time * np.sin(4 * np.pi * phase)])
+    velocity[1] += np.tan(np.radians(slope_deg)) * SPEED  # recorded heights are above the ground, which rises
 
     def power(leg_phase):
         force = np.stack([HUMAN.mean(name, leg_phase) for name in ("grf_forward", "grf_vertical")])
         return GRAVITY * (force * velocity).sum(0)
 
-    seconds = gait.metrics["double_support_s"]
+    seconds = metrics["double_support_s"]
     push_off = np.maximum(power(phase + 0.5), 0.0).mean() * seconds
     collision = -np.minimum(power(phase), 0.0).mean() * seconds
-    assert gait.metrics["com_work_J_kg"]["push_off"] == pytest.approx(push_off, rel=0.03)
-    assert gait.metrics["com_work_J_kg"]["collision"] == pytest.approx(collision, rel=0.03)
+    assert metrics["com_work_J_kg"]["push_off"] == pytest.approx(push_off, rel=0.03)
+    assert metrics["com_work_J_kg"]["collision"] == pytest.approx(collision, rel=0.03)
+
+
+def test_each_stride_has_the_largest_force_of_its_own_leg():
+    recording = people()
+    recording.series["force"][:, :, 0] *= 0.8
+    tally = tally_strides(recording)
+    largest, sides = np.array(tally.vertical_max), np.array(tally.stride_sides)
+    highest = HUMAN.mean("grf_vertical", PERCENT / 100).max()
+    assert largest[sides == 0] == pytest.approx(0.8 * highest, abs=0.01)
+    assert largest[sides == 1] == pytest.approx(highest, abs=0.01)
+
+
+def test_a_step_over_a_flight_has_no_double_support_and_no_work_in_it():
+    recording = people()
+    recording.series["force"][recording.series["phase"] > 0.47] = 0.0  # the other foot lands at half of the stride
+    tally = tally_strides(recording)
+    assert len(tally.double_support) > 10
+    assert not np.any(tally.double_support)
+    assert not np.any(tally.push_off)
+    assert not np.any(tally.collision)
+
+
+def test_clearance_is_that_of_the_middle_half_of_swing():
+    recording = people()
+    phase = recording.series["phase"]
+    swing = (phase - HUMAN.toe_off) / (1 - HUMAN.toe_off)
+    recording.series["contact"][..., 1] = np.where(np.abs(swing - 0.5) < 0.3, CLEARANCE, 0.001)[..., None]
+    clearance = tally_strides(recording).clearance
+    assert clearance == pytest.approx([CLEARANCE] * len(clearance))
 
 
 def test_energies_of_a_stride_are_the_sums_of_its_ticks(gait):
