@@ -3,7 +3,7 @@
 from springfoot.errors import SpringfootError
 
 from .body.body import GRAVITY, Body
-from .body.leg_dynamics import FootLoad, LegMotion, inverse_dynamics, leg_motion, projection_moments
+from .body.leg_dynamics import FootLoad, LegMotion, inverse_dynamics, leg_motion, load_at, projection_moments
 from .people.gait_events import PERCENT
 from .people.human import HumanGait, human_gait
 from .people.own_data import OwnGait, read_gait
@@ -33,6 +33,7 @@ __all__ = [
     "identify_pushed",
     "inverse_dynamics",
     "leg_motion",
+    "load_at",
     "plan_walk",
     "planned_moments",
     "projection_moments",

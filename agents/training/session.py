@@ -32,7 +32,7 @@ from .resume_state import restore_learning, resume_state
 from .returns import evaluation_of
 from .run_record import best_of, cut_events, event_sizes, same_source, write_record
 from .sb3_vec_env import SegmentedFootBipedVecEnv
-from .stopping import Stopping
+from .signals import Stopping
 from .training_log import log_configuration, without_writer_tracebacks
 
 PACKAGES = ("springfoot", "mujoco", "gymnasium", "numpy", "scipy", "torch", "stable-baselines3")

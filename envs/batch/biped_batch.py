@@ -23,6 +23,7 @@ from ..control.person_actions import PersonActions
 from ..control.reference_walk import reference_walks, rows
 from ..control.standing import WALKING, Standing, off_phase
 from ..control.stiffness_control import FootSprings, draw_delay
+from ..control.stiffness_source import StiffnessSource
 from ..control.subjects import Subjects
 from ..control.worn_feet import WornFeet
 from ..physics.contact import CONTACTS
@@ -124,6 +125,7 @@ class Biped(ExactState):
         self._learned = None if settings.person == "tuned" else LearnedPerson(settings.person, settings.guide)
         aim_rate = settings.aim_rate if self._learned is None else self._learned.aim_rate
         self._person = PersonActions(settings, self.subjects.rows, aim_rate)
+        self._source = StiffnessSource(settings, self.subjects.rows)
         self._task = Task(settings, table_rows, self.subjects, self._simulation.feet)
         self._ground = Ground(settings, self._simulation, self.subjects, self._task.rows)
         self._noise = SensorNoise(settings.sensor_noise, self._task.rows)
@@ -253,7 +255,8 @@ class Biped(ExactState):
         self._springs.reset(ids, [draw_delay(self.settings, random) for random in randoms])
         self._noise.draw(ids, randoms)
         self._decisions.reset(ids)
-        self._person.reset(ids, randoms)
+        self._person.reset(ids)
+        self._source.reset(ids, randoms)
         posture = walking_posture(self._start, self.subjects, ids, phase)
         if self._standing is not None:
             standing_posture = self._standing.reset(ids, randoms, self._ground.slope[ids], start == "standing")
@@ -349,7 +352,7 @@ class Biped(ExactState):
             raise SpringfootError("actions must be finite numbers in [-1, 1], got NaN or infinity")
         factor = self._springs.factor(taken)
         # Where the setting `stiffness_by` has others set the stiffness, their factor takes the place of the action's.
-        self._person.replace(factor, self._springs.factor_at_one, running, self._random)
+        self._source.replace_factors(factor, self._springs.factor_at_one, running, self._random)
         # Until `_before_step` asks `Standing`, all bodies that run walk, and none with the schedule's stiffness.
         return _Step(
             running=running, ids=ids, factor=factor, of_person=of_person, walking=running, on_schedule=self._nobody

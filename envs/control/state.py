@@ -44,7 +44,7 @@ STIFFNESS_SOURCE = np.dtype(
         ("drawn", float, len(ACTIONS)),  # in place of the action, as the action mode of `scheduled` reads it
     ]
 )
-"""Source of the stiffness of one environment (`envs.control.person_actions`)."""
+"""Source of the stiffness of one environment (`envs.control.stiffness_source`)."""
 PERSON = np.dtype(
     [
         ("offset", float, (len(SIDES), len(MOVED))),  # of the rest angles of hip, knee and ankle [rad]

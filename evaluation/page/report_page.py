@@ -199,7 +199,7 @@ def spoken_verdict(
 
 def _guide_words(settings: BipedSettings) -> str:
     """Return words on the target: the body's own plan, people's mean walk, or the walk of the setting `human`."""
-    if settings.guide == "plan":
+    if settings.follows_plan:
         return "after its own plan alone"
     return "after people's mean walk" if settings.human is None else "fitted to an own person"
 

@@ -144,7 +144,7 @@ def feedback(recording: Recording) -> dict[str, dict[str, float | None]]:
     phase (0.1: K varies by 10 %); both are None if no group of legs has two decisions. The variance at equal phase is
     half the mean squared difference of neighbours in phase (Rice, Annals of Statistics 12 (1984) 1215), so that a
     schedule has next to none, be it smooth or constant but for jumps. Legs that are not alike (`alike_legs`) have
-    schedules of their own: the variances of each leg are averaged. What difference alike legs have counts.
+    schedules of their own: the variances of each leg are averaged. Differences between alike legs count.
     """
     by_leg = [decisions_of(recording, legs) for legs in alike_legs(recording)]
     # log K (n, 2) of each group of legs, in the order of the phase

@@ -41,7 +41,7 @@ class Toe(NamedTuple):
     """A toe of both feet."""
 
     ankles: str
-    """What ankles it is walked with: `SOUND_ANKLES` or `PASSIVE_ANKLES`."""
+    """Ankles it is walked with: `SOUND_ANKLES` or `PASSIVE_ANKLES`."""
     toe: str
     """The toe in words."""
 

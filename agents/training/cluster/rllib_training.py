@@ -42,7 +42,7 @@ from ..config import TrainingConfig, config_from_json, config_to_json, processor
 from ..progress import Progress
 from ..returns import evaluation_of
 from ..run_record import RLLIB, best_of, is_of_rllib, read_record, require_past, write_record
-from ..stopping import Stopping
+from ..signals import Stopping
 from .nodes import ending_waits, joined, tell_of_wait
 from .rllib_network import OBSERVATION_CLIP, ActorCritic, actor_layers
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from springfoot.envs.batch.biped_batch import Biped
-from springfoot.envs.control.person_actions import DRAWN_SOURCES, FARTHEST_AIM
+from springfoot.envs.control.person_actions import FARTHEST_AIM
+from springfoot.envs.control.stiffness_source import DRAWN_SOURCES
 from springfoot.envs.physics.model import ACTIONS, ANKLE, HIP, KNEE, PERSON_ACTIONS
 from springfoot.envs.settings.settings import BipedSettings
 from springfoot.envs.task.observation_entries import OBSERVATION, PERSON_OBSERVATION
