@@ -47,6 +47,10 @@ MUSCLE_ROW = np.dtype(
 )
 """Recent work of the muscles of one body."""
 
+_BYTES = np.dtype((np.uint8, MUSCLE_ROW.itemsize))
+_CONSTANT_BYTES = MUSCLES.itemsize
+"""Bytes of a row that hold its constants, its first field."""
+
 muscleless_moments = part(tissue_moments)
 """`tissue_moments`, compiled."""
 _interval_work = part(interval_work)
@@ -175,8 +179,6 @@ def forget(rows: NDArray, ids: NDArray | slice, angle: NDArray, velocity: NDArra
 
     Their muscles begin at the joint angles `angle` and velocities `velocity` (N, side, joint) [rad, rad/s].
     """
-    for name in MUSCLE_ROW.names or ():
-        if name != "muscles":
-            rows[name][ids] = 0
+    rows.view(_BYTES)[ids, _CONSTANT_BYTES:] = 0  # field by field it takes far longer
     rows["angle"][ids] = angle[ids]
     rows["velocity"][ids] = velocity[ids]

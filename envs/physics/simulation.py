@@ -172,6 +172,10 @@ class Simulation:
         for state, above_ground in ((self._qpos, base), (self._qvel, base_velocity)):
             state[ids, 1] += self._ground[ids, 0] * above_ground[:, 0]
 
+    def lift(self, ids: NDArray, height: NDArray) -> None:
+        """Lift simulations `ids` (K,) by `height` (K,) [m]."""
+        self._qpos[ids, 1] += height
+
     def lay(self, ids: NDArray, slope: NDArray, height: NDArray) -> None:
         """Give simulations `ids` (K,) sloping ground.
 

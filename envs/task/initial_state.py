@@ -45,10 +45,10 @@ def walking_posture(
     phase = leg_phases(left_phase)
     curves = table.at(phase, subjects.place[ids])  # (K, side, 9) as `_start_curves`; the last, pitch
     angle, velocity = np.split(curves[..., :-1], 2, axis=-1)
-    velocity = velocity / subjects.scale[ids]["time"][:, None, None]
-    feet = subjects.rows["feet"][ids]
-    hangs = (feet["rests"] > 0) & (phase > _SWINGS_FROM)[..., None]
-    angle[..., ANKLE:] = np.where(hangs, feet["rest"], angle[..., ANKLE:])
+    velocity = velocity / subjects.scale["time"][ids, None, None]
+    feet = subjects.rows["feet"]
+    hangs = (feet["rests"][ids] > 0) & (phase > _SWINGS_FROM)[..., None]
+    angle[..., ANKLE:] = np.where(hangs, feet["rest"][ids], angle[..., ANKLE:])
     velocity[..., ANKLE:] = np.where(hangs, 0.0, velocity[..., ANKLE:])
     return angle, velocity, curves[:, 0, -1], subjects.speed[ids]
 
@@ -73,13 +73,12 @@ def place(
         noise: (K, 2, side, joint) relative error of angles ([:, 0]) and rates ([:, 1]) [-].
     """
     angle, velocity, pitch, speed = posture
-    scale = subjects.scale[ids]
     angle = angle * (1.0 + noise[:, 0])
     velocity = velocity * (1.0 + noise[:, 1])
     angle[..., HIP] += pitch[:, None]  # from the thigh's angle to the vertical to that to the trunk
-    feet = subjects.rows["feet"][ids]
-    locked = feet["locked"] > 0
-    angle[..., ANKLE:] = np.where(locked, feet["rest"], angle[..., ANKLE:])
+    feet = subjects.rows["feet"]
+    locked = feet["locked"][ids] > 0
+    angle[..., ANKLE:] = np.where(locked, feet["rest"][ids], angle[..., ANKLE:])
     velocity[..., ANKLE:] = np.where(locked, 0.0, velocity[..., ANKLE:])
     base, rate = np.zeros((2, len(ids), 3))  # of the hips: x [m], z [m], pitch [rad], and their rates
     base[:, 2] = pitch
@@ -87,8 +86,7 @@ def place(
     simulation.reset(ids, base, rate, angle, velocity)
     # With the hips at height 0 the height of the lowest point says how far to lift the body.
     lowest = simulation.measure(ids).contact[ids, ..., 1].min(axis=(1, 2))  # over sides and contacts
-    base[:, 1] = -lowest - START_DEPTH * simulation.body.length_scale * scale["length"]
-    simulation.reset(ids, base, rate, angle, velocity)
+    simulation.lift(ids, -lowest - START_DEPTH * simulation.body.length_scale * subjects.scale["length"][ids])
 
 
 def _start_curves(walk: ReferenceWalk) -> NDArray:
