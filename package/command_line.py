@@ -33,6 +33,7 @@ _REWORDED = {
     r"^Error parsing (--\S+): ": r"\1 ",
     r"invalid literal for int\(\) with base 10: ": "must be a whole number, got ",
     r"could not convert string to float: ": "must be a number, got ",
+    r"no type matching .*: (must be a (whole )?number, got )": r"\1",  # of a number that may be left out
     r"^Missing value for argument '(\S+)'. Expected 1 values": r"\1 needs a value",
     r"^Missing value for argument '(\S+)'. Expected (\d+) values": r"\1 needs \2 values",
 }
@@ -102,7 +103,10 @@ def _repeated_flag(words: Sequence[str], repeatable: Collection[str], synonyms: 
 
 
 def _message_in_box(text: str) -> str:
-    """Return one line for the error that tyro has printed in a box: its first part, and the suggested flags."""
+    """Return one line for the error that tyro has printed in a box: its first part, and the suggested flags.
+
+    tyro tells its errors to no program: the hook beside the printing is private, and may change in any release.
+    """
     lines = [line.strip("│ ") for line in text.splitlines() if not line.startswith(("╭", "╰"))]
     # Rules of dashes divide the box into its error and its suggestions.
     parts = re.split(r"\n[─-]{9,}\n", "\n".join(lines))

@@ -213,7 +213,7 @@ class Subjects:
         return True
 
     def table_body(self, index: int) -> Body:
-        """Return the body for which the tables of environment `index` were made: the settings', of its proportions."""
+        """Return the body that the tables of environment `index` were made for, of the settings' height and mass."""
         return self._table_bodies[self.proportions[index]]
 
     def check(self, given: Mapping[str, Any] | None) -> None:

@@ -1,5 +1,6 @@
 """Return a policy by its name, and settings to evaluate it with: the one place that understands names of policies."""
 
+import os
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -110,6 +111,7 @@ def _name_without_folder(name: str) -> str:
     The best and last policy of a run have the run's name before theirs.
     """
     path = Path(name)
+    real = Path(os.path.realpath(name))  # `Path.resolve` raises for a link to itself
     if path.suffix not in (".safetensors", ".onnx", *SCHEDULE_SUFFIXES):
-        return path.resolve().name.replace(":", "-").replace(",", "-")
-    return f"{path.resolve().parent.name}-{path.stem}" if path.stem in ("best", "last") else path.stem
+        return real.name.replace(":", "-").replace(",", "-")
+    return f"{real.parent.name}-{path.stem}" if path.stem in ("best", "last") else path.stem

@@ -300,8 +300,11 @@ def _legs_by_weight(walk: MeasuredWalk, weight: float | None) -> dict[str, LegSt
 
 
 def _stands_whole(walk: MeasuredWalk, name: str, leg: LegStrides, weight: float) -> NDArray:
-    """Return (S,) True for strides of the leg `name` whose force reaches `LEAST_PEAK` and lasts as long as the foot's
-    motion says (`EARLY_END`); `weight` is the body's, in the unit of the force."""
+    """Return (S,) True for strides of the leg `name` whose force is that of a whole stance.
+
+    Such a force reaches `LEAST_PEAK`, and does not end before the foot leaves the ground by its motion, but for
+    `EARLY_END`. `weight` is the body's, in the unit of the force.
+    """
     whole = leg.curves["grf_vertical"].max(axis=1, initial=0.0) >= LEAST_PEAK * weight
     motion = _contacts_of_motion(walk, walk.legs[name])
     if motion is None or not len(motion.heel_strikes) or not len(motion.toe_offs):
@@ -309,7 +312,8 @@ def _stands_whole(walk: MeasuredWalk, name: str, leg: LegStrides, weight: float)
     begin, off, end = leg.times.T
     late_strike = _lateness(begin, motion.heel_strikes) / (end - begin)
     late_off = _lateness(off, motion.toe_offs) / (end - begin)
-    # Another clock moves heel strike and toe-off alike; at the ends of a record the nearest strike may be the next one.
+    # A force that is early by the same time at heel strike has another clock, and does not end early. At the ends of a
+    # record the nearest strike may be the next one.
     late_clock = np.where(np.abs(late_strike) < 0.5, np.minimum(late_strike, 0.0), 0.0)
     return whole & (late_off - late_clock > -EARLY_END)
 

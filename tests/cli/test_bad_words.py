@@ -73,6 +73,8 @@ COMMANDS_IN_WORDS = "train, evaluate, live, feet, person, score, export, submit,
 CASES = [
     *((["evaluate", "schedule", *words], f"springfoot evaluate: error: {said}") for words, said in EVALUATE),
     *((["train", "--out", "x", *words], f"springfoot train: error: {said}") for words, said in TRAIN),
+    (["score", "mine.csv", "--speed", "x"], "springfoot score: error: --speed must be a number, got 'x'"),
+    (["person", "mine.csv", "--mass", "x"], "springfoot person: error: --mass must be a number, got 'x'"),
     (["evaluat", "schedule"], f"springfoot: error: no command 'evaluat'; there are {COMMANDS_IN_WORDS}; perhaps evaluate?"),
     (["zzz"], f"springfoot: error: no command 'zzz'; there are {COMMANDS_IN_WORDS}"),
     (["study", "comapre"], f"springfoot study: error: no study 'comapre'; there are {', '.join(STUDIES)}; perhaps compare?"),
@@ -107,6 +109,14 @@ def test_a_policy_that_is_not_there_is_told_the_most_similar_beside_it(monkeypat
     (tmp_path / "walk.onnx").touch()
     assert main(["evaluate", typed]) == 2
     assert capsys.readouterr().err.endswith(f"; perhaps {meant}?\n")
+
+
+@pytest.mark.parametrize("words", [["evaluate", "loop"], ["live", "loop"]])
+def test_a_link_to_itself_is_no_policy(monkeypatch, capsys, tmp_path, words):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "loop").symlink_to("loop")
+    assert main(words) == 2
+    assert capsys.readouterr().err == f"springfoot {words[0]}: error: no policy 'loop': {POLICIES}\n"
 
 
 def test_none_is_a_value_of_settings_that_can_be_none():

@@ -9,10 +9,10 @@ from springfoot.envs.physics.contact import BALL_RADIUS, HEEL_RADIUS, TOE_RADIUS
 from springfoot.envs.physics.energy import ledger_entries
 from springfoot.envs.settings.settings import BipedSettings
 from springfoot.envs.task.reward import TERMS
-from springfoot.evaluation.numbers.measured_effort import cost_of_transport
+from springfoot.evaluation.numbers.measured_effort import cost_of_transport, episode_effort
 from springfoot.evaluation.numbers.metrics import measure
 from springfoot.evaluation.numbers.series import GAIT_CYCLE_COLUMNS
-from springfoot.evaluation.numbers.tally import tally_strides
+from springfoot.evaluation.numbers.tally import StrideTally, add_episode, tally_strides
 from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.evaluation.recording.recording import SERIES, Recording, load_recording, record, record_each
 from springfoot.gait import GRAVITY, Body, human_gait
@@ -154,6 +154,30 @@ def test_distances_and_times_of_the_gait(gait):
     assert metrics["toe_clearance_m"] == pytest.approx(CLEARANCE, abs=1e-6)
 
 
+def test_a_step_is_as_long_as_from_where_one_foot_landed_to_where_the_other_lands():
+    recording = people(1)
+    phase = recording.series["phase"]
+    recording.series["ankle"][..., 0] += 0.1 * np.sin(np.pi * phase)  # creeps forward after landing, and back
+    assert measure(recording).metrics["step_length_m"] == pytest.approx(HUMAN.step_length, abs=0.006)
+
+
+def test_steps_outside_the_steady_walk_do_not_count():
+    recording = people(1)
+    tally = StrideTally()
+    add_episode(tally, recording.episode(0), recording.settings, (1.0, 5.0))
+    landings = HUMAN.stride_time * (0.2 + 0.5 * np.arange(20))  # left and right in turn
+    inside = (landings[:-1] > 1.0) & (landings[1:] < 5.0)
+    assert len(tally.step_length) == len(tally.step_time) == inside.sum()
+
+
+def test_a_cop_below_a_moving_ankle_stays_below_it():
+    recording = people(1)
+    com = recording.series["com"][..., None, 0]
+    recording.series["ankle"][..., 0] = com - 0.1
+    recording.series["contact"][..., 0] = com[..., None] - 0.1
+    np.testing.assert_allclose(tally_strides(recording).cop.mean("x"), 0.0, atol=5e-4)  # half a tick is 6 mm
+
+
 def test_centre_of_mass_on_its_plan_has_no_error(gait):
     com = gait.metrics["com"]
     # Heel strike is seen at 0.05 BW, a few ms after it: 1.2 m/s makes that a few mm.
@@ -174,6 +198,25 @@ def test_effort_is_the_plans_price_of_peoples_curves(gait):
     for parts in (effort["per_joint"], effort["per_leg"]):
         for name in ("fibre_J_kg_m", "net_joint_J_kg_m", "activation"):
             assert sum(part[name] for part in parts.values()) == pytest.approx(effort[name])
+
+
+def test_net_joint_energy_is_the_price_of_peoples_joint_work(gait):
+    phase = np.arange(1000) / 1000
+    energy = 0.0  # of one leg in a stride [J/kg]
+    for joint, curve in (("hip", "thigh"), ("knee", "knee"), ("ankle", "ankle")):
+        power = -HUMAN.mean(f"{joint}_moment", phase) * HUMAN.rate(curve, phase)
+        energy += np.maximum(power, 0.0).mean() / 0.25 - np.minimum(power, 0.0).mean() / 1.2  # MUSCLE_EFFICIENCY
+    assert gait.metrics["effort"]["net_joint_J_kg_m"] == pytest.approx(2 * energy / STRIDE_LENGTH, rel=0.03)
+
+
+def test_effort_of_an_episode_leaves_out_the_first_and_the_last_tick():
+    recording = people(1)
+    recording.series["joint_work"][...] = [1.0, 0.0]  # J a tick, of each joint
+    effort = episode_effort(recording.episode(0), BODY, recording.settings.feet, 100, 110)
+    assert effort is not None
+    assert effort.seconds == pytest.approx(0.08)
+    assert effort.distance == pytest.approx(SPEED * 0.08, rel=1e-3)
+    np.testing.assert_allclose(effort.net_energy, 8 / 0.25)
 
 
 @pytest.mark.parametrize("slope_deg", [0.0, 4.0])
