@@ -37,6 +37,7 @@ def told(folder, *words):
     return subprocess.run(command, cwd=folder, env=environment, check=True, capture_output=True, text=True).stderr
 
 
+@pytest.mark.slow
 def test_compiling_is_told_once_and_not_where_the_kernels_are_kept(tmp_path):
     (tmp_path / "kernels.py").write_text(TWO_KERNELS, encoding="utf-8")
     assert told(tmp_path, "-c", "import kernels") == f"{NOTICE}\n"

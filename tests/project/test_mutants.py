@@ -135,6 +135,7 @@ def test_a_stop_and_a_limit_end_a_process(tmp_path):
         processes.run(sleep, tmp_path)
 
 
+@pytest.mark.slow
 def test_lines_of_compiled_kernels_count_where_they_are_called(tmp_path):
     code = """
 from benchmarks import executed_lines

@@ -286,6 +286,7 @@ def verdicts(users_python, tmp_path_factory):
     return said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("program", ["every_name.py", "user.py"])
 def test_no_public_name_is_unknown_to_a_strict_type_checker(verdicts, program):
     assert verdicts[program] == []
@@ -367,6 +368,7 @@ def test_a_room_works_without_the_floors_above(room, absent):
     assert not absent & set(loaded)
 
 
+@pytest.mark.slow
 def test_evaluating_and_the_studies_that_train_nothing_need_no_learner():
     names = ("compare", "bodies", "agreement", "any-stiffness")
     code = f"""

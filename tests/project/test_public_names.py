@@ -80,6 +80,7 @@ LIGHT = [
 imports counts for those below it too."""
 
 
+@pytest.mark.slow
 def test_a_light_name_imports_nothing_heavy():
     told = "print(*{name.partition('.')[0] for name in sys.modules})"
     code = "import sys\n" + "".join(f"{program}\n{told}\n" for program, _ in LIGHT)

@@ -83,6 +83,7 @@ MODELS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MODELS)
 def test_a_model_of_stable_baselines3_becomes_a_file_that_acts_the_same(name, tmp_path):
     model = spread(MODELS[name]().learn(200))

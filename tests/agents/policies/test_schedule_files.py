@@ -80,6 +80,7 @@ def test_mean_and_spread_of_a_schedule_are_those_put_in():
     assert curves["ankle_left_stiffness_Nm_per_rad_sd"].mean() == pytest.approx(expected, rel=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("side", SIDES)
 def test_the_finite_states_of_a_walk_are_a_policy_that_walks(folder, side):
     file = folder / f"finite_states_{side}.json"  # its toes are not alike

@@ -128,6 +128,7 @@ def test_a_cache_cut_short_is_made_anew(tmp_path):
     assert alone(tmp_path, modules=[*cuts]).stdout == "1 0\n" * len(cuts)
 
 
+@pytest.mark.slow
 def test_a_cache_with_a_flipped_bit_does_not_run(tmp_path):
     assert alone(tmp_path).stdout == "0 0\n"
     (file,) = (tmp_path / "__pycache__").glob("alone.whole*.nbc")

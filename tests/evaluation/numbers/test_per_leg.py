@@ -79,6 +79,7 @@ def test_a_walk_without_strides_has_no_numbers():
     assert set(gait.metrics["asymmetry"].values()) == {None}
 
 
+@pytest.mark.slow
 def test_table_and_pictures_tell_the_legs_apart(recordings, tmp_path):
     recording = recordings[0]
     gait = measure(recording)

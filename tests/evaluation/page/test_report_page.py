@@ -280,6 +280,7 @@ def test_several_policies_have_a_folder_each_and_one_page(tmp_path, monkeypatch,
     assert f"\nreport.html, in each of the folders {', '.join(labels)}: metrics.json, " in told
 
 
+@pytest.mark.slow
 def test_the_page_can_be_left_out_and_a_policy_cannot(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert evaluate_main(["random", "--episodes", "1", "--seconds", "1", "--no-report", "--out", "bare"]) == 0

@@ -89,6 +89,7 @@ def test_csv_and_metrics_agree(folder):
     assert max(vertical[35:61]) == pytest.approx(metrics["grf"]["vertical_peak2_bw"], rel=1e-5)
 
 
+@pytest.mark.slow
 def test_a_walk_that_only_falls_is_reported_too(tmp_path):
     fallen = walked(episodes=1, name="constant", push_newton=3000.0, push_interval=0.5)
     gait = measure(fallen)
@@ -242,6 +243,7 @@ def command(monkeypatch, capsys, tmp_path):
     return run
 
 
+@pytest.mark.slow
 def test_the_command_numbers_its_folders_and_says_where_they_are(command, tmp_path):
     (tmp_path / "runs" / "eval-random-1").mkdir(parents=True)
     code, out, _ = command("random", "--episodes", "1", "--seconds", "1")

@@ -22,6 +22,7 @@ def recording():
     return record(policy, settings, name="schedule", episodes=2, threads=1)
 
 
+@pytest.mark.slow
 def test_the_picture_draws_the_walk_over_people(recording, tmp_path):
     gait, human = measure(recording), human_gait(1.2)
     with kept_figures() as figures:

@@ -96,6 +96,7 @@ def test_the_search_runs_and_leaves_the_file_alone_with_quick(tmp_path, capsys):
     assert (tmp_path / "out" / "generations.csv").is_file()
 
 
+@pytest.mark.slow
 def test_a_search_at_several_speeds_finds_one_style_linear_in_speed(tmp_path):
     styles = tmp_path / "styles.json"
     search = PlanTuning(speeds=(0.9, 1.2, 1.5), generations=2, population=4, sigma=0.02, start=STYLES, styles=styles)

@@ -139,6 +139,7 @@ def test_zmp_of_peoples_double_support_is_near_peoples(speed, rms):
     assert np.sqrt(np.mean((plan.zmp(step) - moment / load) ** 2)) < rms
 
 
+@pytest.mark.slow
 def test_constants_of_the_whole_roll_are_where_their_fit_ends():
     """Moved by a twentieth either way, none brings the walks nearer to people's by more than a tenth of a per cent."""
     cases, start = [fit_feet.case(speed) for speed in fit_feet.SPEEDS], fit_feet.constants()

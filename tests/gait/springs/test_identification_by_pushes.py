@@ -114,6 +114,7 @@ def test_the_mean_course_moves_on_within_a_bin_and_so_does_its_straight_line():
         assert known(after)[0] == pytest.approx(known(before)[0], rel=1e-6)
 
 
+@pytest.mark.slow
 def test_intervals_hold_the_truth_in_95_percent_of_200_repeats_and_true_springs_are_called_springs():
     held, verdicts = [], []
     for seed in range(200):

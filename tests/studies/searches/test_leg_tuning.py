@@ -72,6 +72,7 @@ def test_legs_like_peoples_pay_less_than_legs_farther_off_and_those_less_than_le
     assert paid[1] < paid[2] < paid[0]
 
 
+@pytest.mark.slow
 def test_searches_and_studies_measure_as_an_evaluation_does(monkeypatch):
     """A measurer that finds heel strikes late and toe-offs early moves an evaluation, a search and a study alike; one
     that finds the speed too high, an evaluation and a search."""
@@ -112,6 +113,7 @@ def run(*words):
     return study_main(["leg-tuning", *map(str, words)])
 
 
+@pytest.mark.slow
 def test_a_search_writes_its_constants_and_its_command_and_leaves_the_others_alone(constants):
     before = json.loads(constants.read_text())
     words = ["--generations", "1", "--population", "4", "--threads", "1", "--constants", constants]
@@ -149,6 +151,7 @@ def test_bad_input_is_one_line_exit_code_2_and_nothing_written(monkeypatch, caps
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
+@pytest.mark.slow
 def test_a_search_pushes_from_a_generation_on(constants):
     own = constants.read_bytes()
 

@@ -40,6 +40,7 @@ def test_torque_is_recorded_at_the_same_instant_as_angle_and_velocity():
     assert torque[begun] == pytest.approx(spring[begun], abs=1e-3)
 
 
+@pytest.mark.slow
 def test_springs_are_found_in_every_loaded_phase_ramps_included():
     rows = loaded(identified(samples(pushed("schedule"))))
     assert {row.joint for row in rows} == {"ankle", "toe"} and len(rows) >= 8
@@ -115,6 +116,7 @@ def test_scrambled_torque_makes_no_spring():
     assert all(row.pushed.verdict != SPRING for row in identified(data))
 
 
+@pytest.mark.slow
 def test_the_command_writes_table_and_numbers_and_the_same_seeds_the_same(capsys, tmp_path):
     numbers = []
     for threads in ("1", "2"):

@@ -159,12 +159,14 @@ def test_stiffness_changes_in_its_joint_phase_leg_and_strides_alone():
     assert stride.min() >= 1
 
 
+@pytest.mark.slow
 def test_no_change_of_stiffness_changes_nothing_to_the_last_bit(pairs):
     same = pairs[0.0]
     assert not same.fixed.any() and not same.velocity.any() and not same.movement.any()
     assert np.array_equal(same.unchanged, pairs[CHANGE].unchanged)
 
 
+@pytest.mark.slow
 def test_walks_move_where_springs_carry_load_and_not_in_swing(pairs):
     walks = pairs[CHANGE]
     speed = walks.movement[..., 0, MOVEMENT.index("speed_m_s")].mean(-1)  # (C, durations) of the first stride
@@ -178,6 +180,7 @@ def test_walks_move_where_springs_carry_load_and_not_in_swing(pairs):
     assert not walks.unfinished.any() and not walks.cut.any()
 
 
+@pytest.mark.slow
 def test_the_impulse_is_acceleration_times_the_phase_and_foretells_the_velocity_at_its_end(pairs):
     walks = pairs[CHANGE]
     fixed: dict[str, Any] = dict(zip(FIXED, np.moveaxis(walks.fixed.mean(1), -1, 0), strict=True))
@@ -191,6 +194,7 @@ def test_the_impulse_is_acceleration_times_the_phase_and_foretells_the_velocity_
     assert 0.7 < np.corrcoef(fixed["forward_m_s"], walks.velocity.mean(1))[0, 1] < 0.95
 
 
+@pytest.mark.slow
 def test_the_coms_lead_after_a_stride_is_its_speed_times_the_strides_time(pairs):
     walks = pairs[CHANGE]
     speed, ahead = (walks.movement[:, 1, :, 0, MOVEMENT.index(name)] for name in ("speed_m_s", "com_ahead_m"))
@@ -198,6 +202,7 @@ def test_the_coms_lead_after_a_stride_is_its_speed_times_the_strides_time(pairs)
     assert np.polyfit(speed.ravel(), ahead.ravel(), 1)[0] == pytest.approx(1.09, abs=0.15)
 
 
+@pytest.mark.slow
 def test_steps_as_long_as_strides_are_fast(pairs):
     speed, length, ahead, height = np.moveaxis(pairs[CHANGE].unchanged, -1, 0)
     stride = np.diff(ahead, axis=1)
@@ -205,6 +210,7 @@ def test_steps_as_long_as_strides_are_fast(pairs):
     assert speed.mean() == pytest.approx(1.19, abs=0.03) and height.mean() == pytest.approx(0.973, abs=0.01)
 
 
+@pytest.mark.slow
 def test_walks_that_fall_cannot_be_compared():
     policy, settings = policy_and_settings("random", {})
     with pytest.raises(SpringfootError, match="of 2 unchanged walks fewer than two stay up"):
