@@ -9,7 +9,8 @@ export OMP_NUM_THREADS ?= 1
 
 # On every core, neighbours together as long as no core is idle: what the tests of a file share is made once or twice.
 # Python keeps its bytecode whatever the environment says: else each worker and each of many short commands compiles all.
-PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest --numprocesses auto --dist worksteal
+# Each copy of MuJoCo's data reserves 15 MB, mostly untouched: in the heap, many would make a worker too large to fork.
+PYTEST := PYTHONDONTWRITEBYTECODE= MALLOC_MMAP_THRESHOLD_=4194304 $(BIN)/python -m pytest --numprocesses auto --dist worksteal
 
 .PHONY: help install walk predict answers test test-all test-wheel test-sdist test-lowest notebooks licences test-learners test-rllib test-kills fuzz extremes mutants check format bench benchmark docs lock clean
 
