@@ -5,8 +5,8 @@ import shutil
 import signal
 import sys
 import threading
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,9 @@ READER_LEFT = 128 + 13
 
 INTERRUPTED, TERMINATED = 128 + 2, 128 + 15
 """Exit codes after Ctrl-C and SIGTERM, as a shell gives them for a program that these end."""
-_SIGNALS = {signal.SIGINT: (b"interrupted", INTERRUPTED), signal.SIGTERM: (b"ended by SIGTERM", TERMINATED)}
+ENDING = (signal.SIGINT, signal.SIGTERM)
+"""Signals that ask a command to end: Ctrl-C and `kill`."""
+_SAID = {signal.SIGINT: (b"interrupted", INTERRUPTED), signal.SIGTERM: (b"ended by SIGTERM", TERMINATED)}
 
 
 def at_terminal(command: Callable[[], int]) -> int:
@@ -29,13 +31,20 @@ def at_terminal(command: Callable[[], int]) -> int:
     from before its first writing on (`command_line.end_in_order`).
     """
     _name_glfw_library()  # else glfw would start a process to look for it, which Ctrl-C would reach too
-    in_main = threading.current_thread() is threading.main_thread()
-    handlers = {number: signal.signal(number, _end_at_once) for number in _SIGNALS} if in_main else {}
-    try:
+    with handling(_end_at_once):
         return _run_and_flush(command)
+
+
+@contextmanager
+def handling(handler: Callable[[int, Any], object]) -> Iterator[None]:
+    """Give SIGINT and SIGTERM to `handler` within the block; see them in the main thread only, as Python does."""
+    in_main = threading.current_thread() is threading.main_thread()
+    before = {number: signal.signal(number, handler) for number in ENDING} if in_main else {}
+    try:
+        yield
     finally:
-        for number, handler in handlers.items():
-            signal.signal(number, handler)
+        for number, earlier in before.items():
+            signal.signal(number, earlier)
 
 
 def _name_glfw_library() -> None:
@@ -51,7 +60,7 @@ def _name_glfw_library() -> None:
 
 def _end_at_once(number: int, _frame: Any) -> None:
     """End the process with one line on standard error and the signal's exit code."""
-    text, code = _SIGNALS[signal.Signals(number)]
+    text, code = _SAID[signal.Signals(number)]
     with suppress(OSError):  # nobody reads it any more
         os.write(2, b"springfoot: " + text + b"\n")
     os._exit(code)  # an exception is lost in some imports, and is a traceback in others

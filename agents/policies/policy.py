@@ -182,7 +182,7 @@ def find_policy(name: str | Path) -> Path:
             raise SpringfootError(f"this installation of springfoot has no {name} policy; train one: springfoot train")
     elif path.is_dir():
         if not (path / BEST).is_file():
-            raise SpringfootError(f"{name} is a folder without {BEST}, so not a run of springfoot train")
+            raise SpringfootError(f"{path} is a folder without {BEST}, so not a run of springfoot train")
         path /= BEST
     elif not path.is_file():
         raise SpringfootError(

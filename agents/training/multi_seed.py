@@ -12,6 +12,7 @@ import sys
 import threading
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
@@ -24,6 +25,7 @@ from springfoot.files.locks import owned
 from springfoot.files.markdown import MISSING, plus_minus, table, text_of
 from springfoot.files.writing import require_new, write_atomically
 from springfoot.gait.people.scores import mean_sd
+from springfoot.terminal import ENDING, handling
 
 from ..policies.policy import RUN
 from .config import TrainingConfig, config_from_json, config_to_json, processors
@@ -33,8 +35,6 @@ SEEDS = "seeds.json"
 """Name of the file with the results of all seeds."""
 Engine = Literal["here", "ray"]
 """Where several trainings run: in processes on this machine, or on the nodes of a Ray cluster."""
-SIGNALS = (signal.SIGINT, signal.SIGTERM)
-"""Signals that are passed on to the trainings."""
 SPREAD = ("seconds", "return_mean", "falls", "best_timesteps")
 """Results in `seeds.json` with mean and standard deviation (n - 1) over the seeds."""
 
@@ -167,14 +167,13 @@ class _Trainings:
         self.stopping: signal.Signals | None = None  # the signal that came, if one did
         self._lock = threading.RLock()  # reentrant: a second signal may interrupt the passing on of the first
         self._running: list[subprocess.Popen[str]] = []
-        self._handlers_before: dict[int, Any] = {}
+        self._handled = ExitStack()
 
     def run(self, config: TrainingConfig, folder: Path, name: str) -> dict[str, Any]:
         """Train in a process of its own, print its messages after its `name`, and return its row of results."""
         command = _command(config, folder)
-        _block_signals(
-            True
-        )  # the new process inherits this, and unblocks after its imports; this thread only waits for it
+        # The new process inherits this, and unblocks after its imports; this thread only waits for it.
+        _block_signals(True)
         with self._lock:
             if self.stopping:
                 return _result_row(config, folder, "not begun")
@@ -210,18 +209,15 @@ class _Trainings:
                 process.send_signal(number)
 
     def __enter__(self) -> "_Trainings":
-        """Handle SIGINT and SIGTERM, which Python allows in the main thread only."""
-        if threading.current_thread() is threading.main_thread():
-            for number in SIGNALS:
-                self._handlers_before[number] = signal.signal(number, self._stop)
+        """Handle the signals."""
+        self._handled.enter_context(handling(self._stop))
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Restore the signal handlers; terminate processes that still run, as they do only after an error."""
-        for number, handler in self._handlers_before.items():
-            signal.signal(number, handler)
+        self._handled.close()
         for process in self._running:
             process.terminate()
 
@@ -229,7 +225,7 @@ class _Trainings:
 def _block_signals(blocked: bool) -> None:
     """Block or unblock SIGINT and SIGTERM in this thread and in the processes it starts."""
     if hasattr(signal, "pthread_sigmask"):
-        signal.pthread_sigmask(signal.SIG_BLOCK if blocked else signal.SIG_UNBLOCK, SIGNALS)
+        signal.pthread_sigmask(signal.SIG_BLOCK if blocked else signal.SIG_UNBLOCK, ENDING)
 
 
 def _result_row(config: TrainingConfig, folder: Path, if_incomplete: str) -> dict[str, Any]:

@@ -1,12 +1,11 @@
 """Stop a training in good order at the first SIGINT or SIGTERM, and at once at the second."""
 
 import signal
-import threading
+from contextlib import ExitStack
 from types import TracebackType
 from typing import Any
 
-SIGNALS = (signal.SIGINT, signal.SIGTERM)
-"""Signals that stop a training."""
+from springfoot.terminal import handling
 
 
 class Stopping:
@@ -18,7 +17,7 @@ class Stopping:
     def __init__(self) -> None:
         self.asked = False
         self.signal: signal.Signals | None = None
-        self._handlers_before: dict[int, Any] = {}
+        self._handled = ExitStack()
 
     def _stop(self, number: int, _frame: Any) -> None:
         """Note the first signal; at the second, raise KeyboardInterrupt."""
@@ -26,27 +25,20 @@ class Stopping:
         self.signal = signal.Signals(number)
         self.asked = True
         if not first:
-            self._restore()  # a third signal meets the handlers from before
+            self._handled.close()  # a third signal meets the handlers from before
             raise KeyboardInterrupt
 
     def ask(self) -> None:
         """Request to stop, without a signal."""
         self.asked = True
 
-    def _restore(self) -> None:
-        """Restore the signal handlers that stood before the block."""
-        for number, handler in self._handlers_before.items():
-            signal.signal(number, handler)
-
     def __enter__(self) -> "Stopping":
-        """Handle the signals, which Python allows in the main thread only."""
-        if threading.current_thread() is threading.main_thread():
-            for number in SIGNALS:
-                self._handlers_before[number] = signal.signal(number, self._stop)
+        """Handle the signals."""
+        self._handled.enter_context(handling(self._stop))
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Restore the earlier handling of the signals."""
-        self._restore()
+        self._handled.close()

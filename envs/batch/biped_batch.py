@@ -303,6 +303,8 @@ class Biped(ExactState):
         self._fit_springs(ids.tolist())  # lines of another batch may have other numbers
 
     def _feet_of(self, ids: NDArray) -> list[Any] | None:
+        """Return the feet (left, right) of the bodies `ids` as JSON; None if all are those of `settings`, and none is
+        drawn."""
         replaced = self._worn.to_json(ids.tolist())
         return replaced if self.settings.drawn_feet or any(any(pair) for pair in replaced) else None
 

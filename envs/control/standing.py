@@ -234,7 +234,8 @@ class Standing:
             command(ids, np.minimum(subjects.speed[ids], SLOW_SPEED * held["time"][ids]))
         ids = new[STOPPED]
         held["rest"][ids] = m.angle[ids]
-        held["rest"][ids, :, HIP] -= TRUNK_FREE * m.base[ids, 2, None]  # which `_drive` adds: base[2] is the pitch
+        # `_drive` adds TRUNK_FREE x pitch to the hips' rest angle; taken off here, the hips hold their present angle.
+        held["rest"][ids, :, HIP] -= TRUNK_FREE * m.base[ids, 2, None]  # base: x, z and pitch of the trunk
         held["draw"][ids] = 0.0
         held["rest"][ids, :, KNEE] += STOP_KNEE
         held["pitch"][ids] = [self._subjects.bodies[index].trunk_lean + STOP_PITCH for index in ids.tolist()]

@@ -183,13 +183,18 @@ def _sum_changes(parts, control, control_before, angle, energy):
             for joint in range(4):
                 k = control[i, side, joint, 0]
                 k_before = control_before[i, side, joint, 0]
-                # Neither at the start of an episode (NaN is not > 0), nor without a spring, nor for a device by a line.
+                # Not at the start of an episode (NaN is not > 0), without a spring, or for a foot whose torque is a
+                # table of the angle.
                 if k + k_before > 0.0 and not parts[i].table[side, joint]:
-                    old = control_before[i, side, joint, 1] / k_before  # rest angles
-                    new = control[i, side, joint, 1] / k
-                    old, new = old if k_before > 0.0 else new, new if k > 0.0 else old  # a slack spring has no rest
-                    before = old - angle[i, side, joint]
-                    after = new - angle[i, side, joint]
+                    rest = control[i, side, joint, 1] / k
+                    rest_before = control_before[i, side, joint, 1] / k_before
+                    # A slack spring has no rest angle; it takes that of the other window, so that K alone changes.
+                    if k == 0.0:
+                        rest = rest_before
+                    if k_before == 0.0:
+                        rest_before = rest
+                    before = rest_before - angle[i, side, joint]
+                    after = rest - angle[i, side, joint]
                     energy[i].stiffness_changes[joint] += 0.5 * (k - k_before) * before * before
                     energy[i].equilibrium_changes[joint] += 0.5 * k * (after * after - before * before)
 

@@ -7,6 +7,7 @@ import pytest
 
 from springfoot.envs.physics.contact import BALL_RADIUS, HEEL_RADIUS, TOE_RADIUS
 from springfoot.envs.physics.energy import ledger_entries
+from springfoot.envs.physics.model import SIDES
 from springfoot.envs.settings.settings import BipedSettings
 from springfoot.envs.task.reward import TERMS
 from springfoot.evaluation.numbers.measured_effort import cost_of_transport, episode_effort
@@ -168,6 +169,36 @@ def test_steps_outside_the_steady_walk_do_not_count():
     landings = HUMAN.stride_time * (0.2 + 0.5 * np.arange(20))  # left and right in turn
     inside = (landings[:-1] > 1.0) & (landings[1:] < 5.0)
     assert len(tally.step_length) == len(tally.step_time) == inside.sum()
+    strides = (landings[:-2] > 1.0) & (landings[2:] < 5.0)
+    assert len(tally.stride_time) == len(tally.vertical_max) == strides.sum()
+
+
+def test_a_step_is_that_of_the_foot_which_swings_and_lands_at_its_end():
+    recording = people(1)
+    recording.series["ankle"][..., 0, 0] += 0.1  # left foot ahead
+    tally = tally_strides(recording)
+    length = np.array(tally.step_length)
+    left = np.array(tally.step_sides) == SIDES.index("left")
+    assert length[left].mean() == pytest.approx(HUMAN.step_length + 0.1, abs=0.006)
+    assert length[~left].mean() == pytest.approx(HUMAN.step_length - 0.1, abs=0.006)
+
+
+def test_the_rewards_terms_keep_time_with_the_com():
+    recording = people(1)
+    ramp = 0.01 * np.arange(recording.series["com"].shape[1])
+    recording.series["com_velocity"][..., 0] = ramp
+    recording.series["reward"] = np.broadcast_to(ramp[:, None], recording.series["reward"].shape).astype(np.float32)
+    tally = tally_strides(recording)
+    np.testing.assert_allclose(tally.reward.mean(TERMS[0]), tally.com.mean("vx"), atol=1e-6)
+
+
+def test_the_way_walked_lasts_to_the_end_of_the_last_tick():
+    recording = people(1)
+    recording.series["com"][0, -1, 0] += 1.0
+    tally = tally_strides(recording)
+    steady = 10.0 - recording.measured_span[0]
+    assert tally.distance == pytest.approx(SPEED * steady + 1.0, abs=1e-3)
+    assert tally.speed == pytest.approx([tally.distance / steady])
 
 
 def test_a_cop_below_a_moving_ankle_stays_below_it():
