@@ -268,7 +268,8 @@ class Compare(WalkingStudy):
     world: bool = False
     """Also walk every policy on slopes, uneven and slippery ground, with delays, loads and other proportions."""
     laboratory: bool = False
-    """Also walk every policy on slopes of 8 %, with loads on the back and on heavy feet, as laboratories had people."""
+    """Also walk every policy on slopes of 8 %, with loads, on heavy feet and at other step times, as laboratories had
+    people."""
     episodes: int = 100
     """Episodes of each row."""
     environment: tyro.conf.OmitArgPrefixes[RecordedFlags]  # type: ignore[valid-type]
@@ -310,7 +311,9 @@ class Compare(WalkingStudy):
                 springs = springs_beside(next(iter(self.policies)), conditions, self.constant, self.factor, self.seed)
                 compared += [spring for spring in springs if spring.name not in self.policies]
             rows = [run_row(*contender, **self.how, progress=progress) for contender in compared]
-            parts += [f"**{what_ran(self, rows[0])}**", comparison_table(rows), verdict(rows)]
+            parts += [f"**{what_ran(self, rows[0])}**", comparison_table(rows)]
+            if len(rows) > 1:
+                parts.append(verdict(rows))
             if len(self.policies) > 1:
                 parts.append(spread_table([row for row in rows if row.name in self.policies]))
             lines += [(_csv_labels(push, row, rows[0]), row.metrics) for row in rows]

@@ -1,4 +1,5 @@
-"""Hold walks on slopes, with loads and on heavy feet, as laboratories had people walk, against the usual walk."""
+"""Hold walks on slopes, with loads, on heavy feet and at other step times, as laboratories had people walk, against the
+usual walk."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -24,6 +25,8 @@ HEAVY_FEET = {0.0: {}} | {
     kg: both({"kind": "intact", "foot_mass_ratio": ratio, "foot_inertia_ratio": ratio}) for kg, ratio in _RATIOS.items()
 }
 """Mass added to both feet together of a body of 63 kg [kg] -> settings (Browning et al. 2007)."""
+STEP_TIMES = {ratio: {"step_time_ratio": ratio} for ratio in (0.85, 1.15)}
+"""Step time over people's at the same speed [-] -> settings."""
 LABORATORY: dict[str, Mapping[str, Any]] = {
     "usual": {},
     "8 % up": SLOPES["up"],
@@ -31,6 +34,7 @@ LABORATORY: dict[str, Mapping[str, Any]] = {
     **{f"load of {100 * ratio:g} % on the back": given for ratio, given in LOADS.items() if ratio},
     **{f"load of {kg:g} kg at the waist": given for kg, given in WAIST_LOADS.items() if kg},
     **{f"{kg:g} kg on the feet": given for kg, given in HEAVY_FEET.items() if kg},
+    **{f"step time × {ratio:g}": given for ratio, given in STEP_TIMES.items()},
 }
 """Condition in words -> settings; the others are compared with the first."""
 LABORATORY_COLUMNS = (
