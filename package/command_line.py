@@ -21,7 +21,7 @@ from typing import Any, TypeVar
 import tyro
 
 from springfoot.errors import SpringfootError, printable, quoted
-from springfoot.terminal import INTERRUPTED, TERMINATED
+from springfoot.terminal import ENDING, INTERRUPTED, TERMINATED, restore_signals
 
 Flags = TypeVar("Flags")
 LONGEST_WORD = 160
@@ -147,7 +147,7 @@ def exit_code(name: str, work: Callable[[], int | None]) -> int:
             stream.reconfigure(errors="replace")  # type: ignore[union-attr]  # a pipe may know ASCII only
     # The work may set handlers of signals, as `end_in_order` does; only the main thread can put them back.
     in_main = threading.current_thread() is threading.main_thread()
-    handlers = [(number, signal.getsignal(number)) for number in (signal.SIGINT, signal.SIGTERM)] if in_main else []
+    before: dict[int, Any] = {number: signal.getsignal(number) for number in ENDING} if in_main else {}
     try:
         return work() or 0
     except BrokenPipeError:  # no bad input: `springfoot.terminal` ends
@@ -162,8 +162,7 @@ def exit_code(name: str, work: Callable[[], int | None]) -> int:
         print(f"{name}: ended by SIGTERM", file=sys.stderr)
         return TERMINATED
     finally:
-        for number, handler in handlers:
-            signal.signal(number, handler)
+        restore_signals(before)
 
 
 def end_in_order() -> None:

@@ -5,8 +5,8 @@ import shutil
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -31,20 +31,26 @@ def at_terminal(command: Callable[[], int]) -> int:
     from before its first writing on (`command_line.end_in_order`).
     """
     _name_glfw_library()  # else glfw would start a process to look for it, which Ctrl-C would reach too
-    with handling(_end_at_once):
-        return _run_and_flush(command)
-
-
-@contextmanager
-def handling(handler: Callable[[int, Any], object]) -> Iterator[None]:
-    """Give SIGINT and SIGTERM to `handler` within the block; see them in the main thread only, as Python does."""
-    in_main = threading.current_thread() is threading.main_thread()
-    before = {number: signal.signal(number, handler) for number in ENDING} if in_main else {}
+    before = take_signals(_end_at_once)
     try:
-        yield
+        return _run_and_flush(command)
     finally:
-        for number, earlier in before.items():
-            signal.signal(number, earlier)
+        restore_signals(before)
+
+
+def take_signals(handler: Callable[[int, Any], object]) -> dict[int, Any]:
+    """Give SIGINT and SIGTERM to `handler`; return the handlers before, by signal, for `restore_signals`.
+
+    Outside the main thread, where Python lets none be set, change nothing and return an empty dictionary.
+    """
+    in_main = threading.current_thread() is threading.main_thread()
+    return {number: signal.signal(number, handler) for number in ENDING} if in_main else {}
+
+
+def restore_signals(before: Mapping[int, Any]) -> None:
+    """Give signals back to the handlers `before`; a second time changes nothing."""
+    for number, handler in before.items():
+        signal.signal(number, handler)
 
 
 def _name_glfw_library() -> None:

@@ -180,14 +180,14 @@ def find_policy(name: str | Path) -> Path:
         path = SHIPPED[str(name)]
         if not path.is_file():
             raise SpringfootError(f"this installation of springfoot has no {name} policy; train one: springfoot train")
-    elif path.is_dir():
+    elif str(name) and path.is_dir():
         if not (path / BEST).is_file():
-            raise SpringfootError(f"{path} is a folder without {BEST}, so not a run of springfoot train")
+            raise SpringfootError(f"{name} is a folder without {BEST}, so not a run of springfoot train")
         path /= BEST
     elif not path.is_file():
         raise SpringfootError(
-            f"no policy {name}: give a .safetensors or .onnx file, a run folder, module:function, or one of "
-            f"{', '.join(SHIPPED)}{perhaps_policy(str(name), SHIPPED)}"
+            f"no policy {str(name) or repr('')}: give a .safetensors or .onnx file, a run folder, module:function, "
+            f"or one of {', '.join(SHIPPED)}{perhaps_policy(str(name), SHIPPED)}"
         )
     return path
 

@@ -12,7 +12,6 @@ import sys
 import threading
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
@@ -25,7 +24,7 @@ from springfoot.files.locks import owned
 from springfoot.files.markdown import MISSING, plus_minus, table, text_of
 from springfoot.files.writing import require_new, write_atomically
 from springfoot.gait.people.scores import mean_sd
-from springfoot.terminal import ENDING, handling
+from springfoot.terminal import ENDING, restore_signals, take_signals
 
 from ..policies.policy import RUN
 from .config import TrainingConfig, config_from_json, config_to_json, processors
@@ -167,7 +166,7 @@ class _Trainings:
         self.stopping: signal.Signals | None = None  # the signal that came, if one did
         self._lock = threading.RLock()  # reentrant: a second signal may interrupt the passing on of the first
         self._running: list[subprocess.Popen[str]] = []
-        self._handled = ExitStack()
+        self._handlers_before: dict[int, Any] = {}
 
     def run(self, config: TrainingConfig, folder: Path, name: str) -> dict[str, Any]:
         """Train in a process of its own, print its messages after its `name`, and return its row of results."""
@@ -210,14 +209,14 @@ class _Trainings:
 
     def __enter__(self) -> "_Trainings":
         """Handle the signals."""
-        self._handled.enter_context(handling(self._stop))
+        self._handlers_before = take_signals(self._stop)
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Restore the signal handlers; terminate processes that still run, as they do only after an error."""
-        self._handled.close()
+        restore_signals(self._handlers_before)
         for process in self._running:
             process.terminate()
 

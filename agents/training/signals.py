@@ -1,11 +1,10 @@
 """Stop a training in good order at the first SIGINT or SIGTERM, and at once at the second."""
 
 import signal
-from contextlib import ExitStack
 from types import TracebackType
 from typing import Any
 
-from springfoot.terminal import handling
+from springfoot.terminal import restore_signals, take_signals
 
 
 class Stopping:
@@ -17,7 +16,7 @@ class Stopping:
     def __init__(self) -> None:
         self.asked = False
         self.signal: signal.Signals | None = None
-        self._handled = ExitStack()
+        self._handlers_before: dict[int, Any] = {}
 
     def _stop(self, number: int, _frame: Any) -> None:
         """Note the first signal; at the second, raise KeyboardInterrupt."""
@@ -25,7 +24,7 @@ class Stopping:
         self.signal = signal.Signals(number)
         self.asked = True
         if not first:
-            self._handled.close()  # a third signal meets the handlers from before
+            restore_signals(self._handlers_before)  # a third signal meets the handlers from before
             raise KeyboardInterrupt
 
     def ask(self) -> None:
@@ -34,11 +33,11 @@ class Stopping:
 
     def __enter__(self) -> "Stopping":
         """Handle the signals."""
-        self._handled.enter_context(handling(self._stop))
+        self._handlers_before = take_signals(self._stop)
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Restore the earlier handling of the signals."""
-        self._handled.close()
+        restore_signals(self._handlers_before)

@@ -7,12 +7,14 @@ import pytest
 
 from springfoot.envs.physics.contact import BALL_RADIUS, HEEL_RADIUS, TOE_RADIUS
 from springfoot.envs.physics.energy import ledger_entries
-from springfoot.envs.physics.model import SIDES
+from springfoot.envs.physics.model import KNEE, SIDES
 from springfoot.envs.settings.settings import BipedSettings
 from springfoot.envs.task.reward import TERMS
+from springfoot.evaluation.numbers.likeness import moment_numbers
 from springfoot.evaluation.numbers.measured_effort import cost_of_transport, episode_effort
 from springfoot.evaluation.numbers.metrics import measure
-from springfoot.evaluation.numbers.series import GAIT_CYCLE_COLUMNS
+from springfoot.evaluation.numbers.per_leg import leg_numbers
+from springfoot.evaluation.numbers.series import GAIT_CYCLE_COLUMNS, foot_contacts, strides_within
 from springfoot.evaluation.numbers.tally import StrideTally, add_episode, tally_strides
 from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.evaluation.recording.recording import SERIES, Recording, load_recording, record, record_each
@@ -278,6 +280,14 @@ def test_each_stride_has_the_largest_force_of_its_own_leg():
     assert largest[sides == 1] == pytest.approx(highest, abs=0.01)
 
 
+def test_push_off_and_collision_are_of_the_leg_whose_force_does_them():
+    recording = people(1)
+    recording.series["force"][:, :, 0] *= 1.5  # of the left leg
+    left, right = (leg["com_work_J_kg"] for leg in leg_numbers(tally_strides(recording)).values())
+    for name in ("push_off", "collision"):
+        assert left[name] == pytest.approx(1.5 * right[name], rel=0.1), name
+
+
 def test_a_step_over_a_flight_has_no_double_support_and_no_work_in_it():
     recording = people()
     recording.series["force"][recording.series["phase"] > 0.47] = 0.0  # the other foot lands at half of the stride
@@ -303,6 +313,33 @@ def test_energies_of_a_stride_are_the_sums_of_its_ticks(gait):
     assert energy["mechanical_change"] == pytest.approx(0.25 * ticks / BODY.mass, rel=1e-3)
     assert energy["residual"] == pytest.approx((0.25 - 0.3 + 0.1) * ticks / BODY.mass, rel=1e-3)
     assert energy["pushes"] == 0.0
+
+
+def test_mechanical_energy_changes_from_one_heel_strike_to_the_next():
+    recording = people(1)
+    time = 0.01 * (1 + np.arange(recording.series["energy"].shape[1]))  # at the ends of ticks
+    recording.series["energy"] = recording.series["energy"].astype(float)
+    recording.series["energy"][0, :, ledger_entries().index("mechanical")] = 100.0 * time**2
+    series = recording.episode(0)
+    vertical = series["force"][..., 1].sum(axis=2)
+    strides = np.concatenate([strides_within(foot, recording.measured_span) for foot in foot_contacts(vertical, BODY)])
+    gained = 100.0 * (strides[:, 2] ** 2 - strides[:, 0] ** 2).mean() / BODY.mass
+    assert measure(recording).metrics["energy_J_kg"]["mechanical_change"] == pytest.approx(gained, rel=1e-4)
+
+
+def test_each_leg_has_half_of_what_the_springs_of_both_got():
+    recording = people(1)
+    recording.series["energy"][..., ledger_entries().index("stiffness_changes/ankle")] = 0.2  # J a tick
+    springs = measure(recording).metrics["springs_J_kg"]
+    assert springs["ankle"]["stiffness_changes"] == pytest.approx(0.1 * HUMAN.stride_time / 0.01 / BODY.mass, rel=1e-3)
+    assert springs["toe"]["stiffness_changes"] == 0.0
+
+
+@pytest.mark.parametrize(("apart", "percent"), [(1.9, 100.0), (2.1, 0.0)])
+def test_moments_are_counted_within_two_standard_deviations(apart, percent):
+    phase = PERCENT / 100
+    curve = HUMAN.mean("ankle_moment", phase) + apart * HUMAN.sd("ankle_moment", phase)
+    assert moment_numbers(curve, HUMAN, "ankle")["within_2sd_percent"] == pytest.approx(percent, abs=1.0)
 
 
 def test_joint_work_is_that_of_peoples_moments_and_rates(gait):
@@ -341,6 +378,17 @@ def test_a_load_on_the_back_leaves_moments_per_kg_of_body(gait):
     carrying = measure(people(carried_ratio=0.25))
     for name in ("hip_moment_Nm_per_kg", "knee_moment_Nm_per_kg", "ankle_moment_Nm_per_kg"):
         np.testing.assert_array_equal(carrying.both.mean(name), gait.both.mean(name), err_msg=name)
+    fibre, net = (carrying.metrics["effort"][name] for name in ("fibre_J_kg_m", "net_joint_J_kg_m"))
+    assert (fibre, net) == tuple(gait.metrics["effort"][name] for name in ("fibre_J_kg_m", "net_joint_J_kg_m"))
+
+
+@pytest.mark.parametrize("side", range(len(SIDES)))
+def test_angles_beyond_peoples_are_those_of_the_worse_leg(side):
+    recording = people(1)
+    recording.series["angle"][:, :, side, KNEE] += 1.5
+    series = recording.episode(0)
+    effort = episode_effort(series, BODY, recording.settings.feet, 100, 900)
+    assert effort is not None and effort.beyond_range > 10.0
 
 
 def test_curves_of_states_and_of_means_begin_together_as_the_foot_lands(gait):
@@ -398,6 +446,8 @@ def test_falls_are_counted_and_their_strides_too():
     assert cut.metrics["seconds_mean"] == pytest.approx((10 + 6 + 10) / 3)
     assert 0 < cut.metrics["strides"]["in_episodes_that_fell"] < whole.both.count / 3
     assert cut.both.count < whole.both.count
+    alone = measure(people(1, fell=[0], cut=600))
+    assert alone.metrics["strides"]["in_episodes_that_fell"] == alone.metrics["strides"]["count"] == alone.both.count
     assert cut.metrics["return"] == {"mean": 1.0, "sd": 1.0}
 
 
