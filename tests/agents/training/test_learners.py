@@ -12,10 +12,9 @@ from springfoot.errors import SpringfootError
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("example", ["sb3", "cleanrl_ppo"])
-def test_a_library_learns_to_walk_better(example, tmp_path):
-    """Half of the steps that `make test-learners` gives."""
-    spec = spec_from_file_location(example, learners.EXAMPLES / f"{example}.py")
+def test_a_library_learns_to_walk_better(tmp_path):
+    """CleanRL's PPO, with half of the steps that `make test-learners` gives; SB3's learns in test_training.py."""
+    spec = spec_from_file_location("cleanrl_ppo", learners.EXAMPLES / "cleanrl_ppo.py")
     assert spec is not None and spec.loader is not None
     module = module_from_spec(spec)
     spec.loader.exec_module(module)

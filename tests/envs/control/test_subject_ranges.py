@@ -46,12 +46,12 @@ def test_a_height_and_a_mass_that_make_no_body_are_drawn_again():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("part", range(4))  # of the same 200 ranges, so that both workers plan
+@pytest.mark.parametrize("part", range(2))  # of the same 100 ranges, so that both workers plan
 def test_whatever_range_its_slowest_and_fastest_body_may_walk_at_starts(part):
     """A short body at a high speed walks as the settings' tall body would beyond the speeds that it may have."""
     random = np.random.default_rng(0)
     beyond = 0
-    for number in range(200):
+    for number in range(100):
         heights = np.sort(random.uniform(1.2, 2.3, 2))
         fastest = min(2.0, 2.1 * np.sqrt(heights[0] / 1.7))  # beyond, its legs are too short for a step
         speeds = np.sort(random.uniform(0.4, fastest, 2))
@@ -61,12 +61,12 @@ def test_whatever_range_its_slowest_and_fastest_body_may_walk_at_starts(part):
         settings = BipedSettings(height=random.choice(heights), speed=random.choice(speeds), **ranges)
         grid = tabulated_speeds(settings)
         beyond += grid[0] < 0.4 or grid[-1] > 2.0
-        if number // 2 % 4 == part:
+        if number // 2 % 2 == part:
             for speed in {grid[0], grid[-1]}:  # speeds between them are easier to plan
                 assert reference_walk_at(settings, float(speed)).speed == pytest.approx(speed)
             if number % 10 == part:
                 assert len(reference_walks(settings)) == len(grid)
-    assert beyond > 20
+    assert beyond > 10
 
 
 def test_a_grid_ends_at_the_range_where_it_would_leave_what_can_be_planned():

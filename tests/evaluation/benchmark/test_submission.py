@@ -46,16 +46,6 @@ def submitted(tmp_path_factory):
     ]
 
 
-@pytest.fixture(scope="module")
-def walking(tmp_path_factory):
-    """A submission of `pretrained`, and one of springs, that walk to the end."""
-    folder = tmp_path_factory.mktemp("submissions")
-    return [
-        benchmark.submit("pretrained", TASK, "ours", folder / "ours", threads=1),
-        benchmark.submit("constant:400,20", TASK, "springs", folder / "springs", threads=1),
-    ]
-
-
 def copied(submission, folder):
     """A copy of a submission's files in a new folder."""
     folder.mkdir()
@@ -66,24 +56,28 @@ def copied(submission, folder):
 
 
 @pytest.mark.slow
-def test_a_submission_is_judged_to_the_same_bits_on_any_number_of_threads(walking, tmp_path):
-    folders = [copied(each, tmp_path / each.name) for each in walking]
+def test_a_submission_is_judged_to_the_same_bits_on_any_number_of_threads(submitted, tmp_path):
+    """Of one that walks to the end, and one that soon falls."""
+    both = [submitted[0], benchmark.submit("pretrained", TASK, "walks", tmp_path / "mine", threads=1)]
+    kept = tmp_path / "judged"
+    kept.mkdir()
+    folders = [copied(each, kept / each.name) for each in both]
     assert main(["judge", *map(str, folders), "--threads", "2"]) == 0
     judged = {folder.name: read_object(folder / benchmark.JUDGED, "judgement") for folder in folders}
     assert [each["same_bits"] for each in judged.values()] == [True, True]
-    rows = judged_rows(tmp_path)
-    means = {each.name: each.walks.returns.mean() for each in walking}
+    rows = judged_rows(kept)
+    means = {each.name: each.walks.returns.mean() for each in both}
     assert [row.submission.name for row in rows] == sorted(means, key=lambda name: -means[name])
     for row in rows:
         told = judged[row.submission.name]
         assert row.return_mean == means[row.submission.name]
         assert (row.drawn_return_mean, row.drawn_falls) == (told["drawn_return_mean"], told["drawn_falls"])
-        assert f"| {' | '.join(row.cells)} |" in leaderboard(tmp_path)
+        assert f"| {' | '.join(row.cells)} |" in leaderboard(kept)
     assert main(["judge", str(folders[0])]) == 2  # judged before
     other = {**judged["ours"], "policy_digest": "0" * 64}
     (folders[0] / benchmark.JUDGED).write_bytes(object_with_digest(other))
     with pytest.raises(SpringfootError, match="judges another policy or task than"):
-        judged_rows(tmp_path)
+        judged_rows(kept)
 
 
 def test_the_task_decides_every_setting_but_the_action_mode(tmp_path):
@@ -164,8 +158,8 @@ def test_numbers_repeat_one_by_one():
 
 
 @pytest.mark.slow
-def test_a_submission_that_does_not_repeat_is_not_judged(walking, tmp_path, capsys):
-    folder = copied(walking[1], tmp_path / "better")
+def test_a_submission_that_does_not_repeat_is_not_judged(submitted, tmp_path, capsys):
+    folder = copied(submitted[0], tmp_path / "better")
     values = read_object(folder / benchmark.SUBMISSION, "submission")
     values["returns"].reverse()  # the same mean
     (folder / benchmark.SUBMISSION).write_bytes(object_with_digest(values))

@@ -72,7 +72,6 @@ def test_ground_gives_nothing_in_any_committed_walk(policy, given):
     ("policy", "given"),
     [
         ("pretrained", {}),
-        ("medium", {}),
         ("predicted", {}),
         ("schedule", {}),
         ("schedule", {"right_foot": "rigid_toe"}),
