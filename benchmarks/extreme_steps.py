@@ -4,7 +4,7 @@
 
 Every observation must be of its space, every reward and every number of the info finite, and the memory flat once the
 tables of speeds and bodies, of which the last few hundred are kept, are full. The tests do it with
-`--steps 50000 --settings 4`: four settings, each walked three times, so that the later times nothing is new.
+`--steps 50000 --settings 6`: six settings, each walked three times, so that the later times nothing is new.
 """
 
 import ctypes

@@ -10,7 +10,8 @@ from springfoot.files.text_table import read_bytes
 from .policy import PRETRAINED_BY, SHIPPED, find_policy, read_policy
 
 LEARNED_3_BY = (
-    "`springfoot train --preset person --seed 1 --out runs/first`, then `springfoot train --preset person --seed 11 "
+    "`springfoot train --preset person --seed 1 --out runs/first`, when the preset had the prices of `learned-2`, "
+    "then `springfoot train --preset person --seed 11 "
     "--begin-from runs/first --timesteps 6000000 --learning-rate 1.2e-4 --learning-rate-end 0.05 "
     "--forward-force-weight 2.5 "
     """--reward-weights '{"pose": 15, "grf": 26, "fibre_work": -38, "impact": -4}'`, its last policy"""
@@ -31,7 +32,7 @@ MADE = {
     ),
     "learned-2": (
         "Trained from nothing by one command; walks at other step times, too.",
-        "`springfoot train --preset person --seed 2`, its last policy",
+        "`springfoot train --preset person --seed 2`, when the preset had the settings below; its last policy",
         "feet",
     ),
     "learned-3": (

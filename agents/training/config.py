@@ -187,21 +187,22 @@ PERSON_TASK = replace(
     slope_range_deg=(-5.0, 5.0),
     unevenness_m=0.005,
     reward_weights={
-        "alive": 40.0,  # about what all prices take at first: with less it learns to fall
+        "alive": 50.0,  # about what all prices take at first: with less it learns to fall
         "speed": 0.5,
         "com_x": 0.2,
         "com_z": 0.0,
         "zmp": 0.0,
-        "pose": 18.0,
-        "grf": 14.0,
+        "pose": 15.0,
+        "grf": 26.0,
         "stiffness_rate": -0.2,
-        "fibre_work": -24.0,
+        "fibre_work": -38.0,
         "activation": -2.0,
-        "impact": -2.0,
+        "impact": -4.0,
         "speed_held": -100.0,
         "person_rate": -0.15,
         "step_length": -40.0,
     },
+    forward_force_weight=2.5,
     knee_weight=3.0,
 )
 """Task of a person: rest angles of hips, knees and ankles, and the stiffness where no other sets it, on drawn bodies,

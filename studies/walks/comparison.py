@@ -202,9 +202,12 @@ def verdict(rows: Sequence[Row]) -> str:
         row.name for row in others if paired_p(first.fell, row.fell) < SIGNIFICANT and first.fell.sum() < row.fell.sum()
     ]
     no_more_falls = [row.name for row in others if row.name not in fall_more]
-    return (
+    earns = (
         f"{first.name} earns more than {compared - len(not_beaten)} of {compared} rows (interval above 0)"
-        f"{'; not more than ' + ', '.join(not_beaten) if not_beaten else ''}. It falls less often than "
+        f"{'; not more than ' + ', '.join(not_beaten) if not_beaten else ''}"
+    )
+    return (
+        f"{earns if compared else f'No return compares with that of {first.name}'}. It falls less often than "
         f"{len(fall_more)} of {len(others)} (p < {SIGNIFICANT:g})"
         f"{'; not less than ' + ', '.join(no_more_falls) if no_more_falls else ''}."
     )

@@ -1,4 +1,4 @@
-"""Learners of other libraries: two learn here, and the judge of `make test-learners` is right about who did."""
+"""Learners of other libraries: one learns here, and the judge of `make test-learners` is right about who did."""
 
 import json
 from importlib.util import module_from_spec, spec_from_file_location
@@ -7,25 +7,35 @@ import numpy as np
 import pytest
 
 from benchmarks import learners
-from springfoot.agents import load_policy
+from springfoot.agents import load_policy, read_policy
 from springfoot.errors import SpringfootError
+
+
+def trained_by(example, out, timesteps):
+    """Return the policy that an example trains for the judge's task."""
+    spec = spec_from_file_location(example, learners.EXAMPLES / f"{example}.py")
+    assert spec is not None and spec.loader is not None
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    module.main(out=f"{out}.safetensors", timesteps=timesteps)
+    policy = read_policy(f"{out}.safetensors")
+    assert policy.settings == learners.TASK
+    return policy
 
 
 @pytest.mark.slow
 def test_a_library_learns_to_walk_better(tmp_path):
-    """CleanRL's PPO, with half of the steps that `make test-learners` gives; SB3's learns in test_training.py."""
-    spec = spec_from_file_location("cleanrl_ppo", learners.EXAMPLES / "cleanrl_ppo.py")
-    assert spec is not None and spec.loader is not None
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    policies = []
-    for timesteps in (0, 65_536):
-        out = tmp_path / f"{timesteps}.safetensors"
-        module.main(out=str(out), timesteps=timesteps)
-        policies.append(load_policy(str(out)))
-    assert policies[1].settings == learners.TASK
+    """CleanRL's PPO, with half of the steps that `make test-learners` gives."""
+    policies = [trained_by("cleanrl_ppo", tmp_path / str(timesteps), timesteps) for timesteps in (0, 65_536)]
     result = learners.judge(*policies, must_learn=True)
     assert result["p"] < learners.SIGNIFICANT and result["after"] > 1.1 * result["before"], result
+
+
+@pytest.mark.slow
+def test_what_sb3_trains_is_a_policy_of_the_task(tmp_path):
+    untrained, trained = (trained_by("sb3", tmp_path / str(timesteps), timesteps) for timesteps in (0, 2_048))
+    observation = np.zeros((1, len(trained.observation_mean)))
+    assert not np.array_equal(trained(observation), untrained(observation))
 
 
 @pytest.mark.slow

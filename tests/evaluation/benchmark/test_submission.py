@@ -58,6 +58,7 @@ def copied(submission, folder):
 @pytest.mark.slow
 def test_a_submission_is_judged_to_the_same_bits_on_any_number_of_threads(submitted, tmp_path):
     """Of one that walks to the end, and one that soon falls."""
+    # Of two tasks, so no table has both; `test_a_table_is_in_the_order_of_returns` has several rows.
     both = [submitted[0], benchmark.submit("pretrained", TASK, "walks", tmp_path / "mine", threads=1)]
     kept = tmp_path / "judged"
     kept.mkdir()
@@ -67,6 +68,7 @@ def test_a_submission_is_judged_to_the_same_bits_on_any_number_of_threads(submit
     assert [each["same_bits"] for each in judged.values()] == [True, True]
     rows = judged_rows(kept)
     means = {each.name: each.walks.returns.mean() for each in both}
+    assert [each.walks.fell.mean() for each in both] == pytest.approx([1.0, 0.0], abs=0.1)
     assert [row.submission.name for row in rows] == sorted(means, key=lambda name: -means[name])
     for row in rows:
         told = judged[row.submission.name]
@@ -278,6 +280,16 @@ def test_a_table_has_eight_rows_and_says_how_many_more_there_are(submitted, tmp_
     assert "\n| h |" in board
     assert "\n| i |" not in board
     assert board.endswith("2 more are not shown.")
+
+
+def test_a_table_is_in_the_order_of_returns(submitted, tmp_path):
+    for name, mean in (("low", 1.0), ("high", 3.0), ("between", 2.0)):
+        folder = copied(submitted[1], tmp_path / name)
+        values = read_object(folder / benchmark.SUBMISSION, "submission") | {"name": name}
+        (folder / benchmark.SUBMISSION).write_bytes(object_with_digest(values))
+        (folder / benchmark.JUDGED).write_bytes(object_with_digest(a_judgement(submitted[1]) | {"return_mean": mean}))
+    rows = [line for line in leaderboard(tmp_path).splitlines() if line.startswith("| ")][2:]
+    assert [row.split(" | ")[0] for row in rows] == ["| high", "| between", "| low"]
 
 
 def test_judge_refuses_before_it_walks(submitted, tmp_path, capsys):

@@ -139,6 +139,9 @@ def test_table_and_verdict_say_what_the_policy_is_ahead_of_and_what_not():
         "ours earns more than 1 of 2 rows (interval above 0); not more than alike. It falls less often than 1 of 3 "
         "(p < 0.05); not less than alike, elsewhere."
     )
+    assert comparison.verdict([ours, rows[3]]) == (
+        "No return compares with that of ours. It falls less often than 0 of 1 (p < 0.05); not less than elsewhere."
+    )
 
 
 def test_spread_table_has_mean_and_sd_over_policies(rows):
