@@ -10,11 +10,11 @@ from springfoot.files.text_table import read_bytes
 from .policy import PRETRAINED_BY, SHIPPED, find_policy, read_policy
 
 LEARNED_3_BY = (
-    "`springfoot train --preset person --seed 1 --out runs/first`, when the preset had the prices of `learned-2`, "
-    "then `springfoot train --preset person --seed 11 "
+    "`springfoot train --preset person --seed 1 --out runs/first`, then `springfoot train --preset person --seed 11 "
     "--begin-from runs/first --timesteps 6000000 --learning-rate 1.2e-4 --learning-rate-end 0.05 "
     "--forward-force-weight 2.5 "
-    """--reward-weights '{"pose": 15, "grf": 26, "fibre_work": -38, "impact": -4}'`, its last policy"""
+    """--reward-weights '{"pose": 15, "grf": 26, "fibre_work": -38, "impact": -4}'`, its last policy, """
+    "both when the preset had the prices of `learned-2`"
 )
 """Commands that made `learned-3` from nothing."""
 MADE = {

@@ -51,7 +51,7 @@ WORLD: tuple[dict[str, Any], ...] = (
 """Conditions of `--world`. Proportions are ± 2 SD of adults; loads are 10 and 20 kg for 63 kg."""
 QUASI_SPEED = 1.35
 """Commanded speed [m/s] at which people's quasi-stiffness, which is not tuned, walks about 1.2 m/s."""
-COMPARABLE = ("speed", "reward_weights")
+COMPARABLE = ("speed", "reward_weights", "forward_force_weight", "knee_weight")
 """Settings that rows must share for a comparison of their returns."""
 SIGNIFICANT = 0.05
 """Largest p of McNemar's test with which a row falls less often than another."""

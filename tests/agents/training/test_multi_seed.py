@@ -75,7 +75,8 @@ def test_bad_input_is_one_line_exit_code_2_and_nothing_on_disk(monkeypatch, caps
 
 
 @pytest.mark.slow
-def test_ctrl_c_ends_all_in_good_order(tmp_path):
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_all_in_good_order(tmp_path, number):
     folder = tmp_path / "several"
     command = [sys.executable, SCRIPT, "--out", folder, "--seeds", "2", "--timesteps", "10_000_000", *SHORT]
     runs = [folder / "seed-0" / RUN, folder / "seed-1" / RUN]
@@ -86,16 +87,18 @@ def test_ctrl_c_ends_all_in_good_order(tmp_path):
                 assert process.poll() is None, process.stderr and process.stderr.read()
                 assert time.monotonic() < deadline
                 time.sleep(0.05)
-            process.send_signal(signal.SIGINT)
+            process.send_signal(number)
             out, error = process.communicate(timeout=60)
         finally:
             process.kill()
-    assert process.returncode == 128 + signal.SIGINT, error
+    assert process.returncode == 128 + number, error
     assert "Traceback" not in error and f"Or:      springfoot train --resume {folder}/seed-0" in out
     record = json.loads((folder / seeds.SEEDS).read_text())
     assert record["status"] == "interrupted"
     assert record["seeds"][0]["status"] == "interrupted" and record["seeds"][0]["timesteps"] >= 1024
     assert record["seeds"][1]["status"] in ("interrupted", "not begun")
+    run = json.loads(runs[0].read_text())
+    assert (run["status"], run["signal"]) == ("interrupted", number.name)  # the process's own words
     assert read_policy(folder / "seed-0").observation_mean.shape
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from springfoot.agents.policies.baselines import BASELINES, constant
 from springfoot.cli.main import study_main
-from springfoot.envs.settings.settings import settings_from, settings_to_json
+from springfoot.envs.settings.settings import BipedSettings, settings_from, settings_to_json
 from springfoot.errors import SpringfootError
 from springfoot.evaluation.numbers.metrics import measure
 from springfoot.evaluation.recording.policies import policy_and_settings
@@ -142,6 +142,17 @@ def test_table_and_verdict_say_what_the_policy_is_ahead_of_and_what_not():
     assert comparison.verdict([ours, rows[3]]) == (
         "No return compares with that of ours. It falls less often than 0 of 1 (p < 0.05); not less than elsewhere."
     )
+
+
+def test_returns_of_other_rewards_do_not_compare():
+    themes = {field.name: field.metadata.get("theme") for field in dataclasses.fields(BipedSettings)}
+    rewards = {name for name in themes if themes[name] == themes["reward_weights"]}
+    assert rewards | {"speed"} == set(comparison.COMPARABLE) and len(rewards) > 1
+    for name in comparison.COMPARABLE:
+        ours, other = row_of("ours", np.arange(20.0)), row_of("other", np.zeros(20))
+        assert other.difference(ours) is not None
+        other.metrics["environment"][name] = "another"
+        assert other.difference(ours) is None
 
 
 def test_spread_table_has_mean_and_sd_over_policies(rows):
