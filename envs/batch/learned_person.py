@@ -26,7 +26,7 @@ PERSONS_FOLDER = Path(__file__).parent / "persons"
 """Folder of the persons that come with the package."""
 LEARNED = {"learned": "learned-1", "learned-1": "learned-1", "learned-2": "learned-2", "learned-3": "learned-3"}
 """Name of a person of this package -> its file in `PERSONS_FOLDER`, without suffix. The first is `last.safetensors` of
-`springfoot train --preset person`, when it drew fewer pairs of feet; the second went on from it, as its card says
+`springfoot train --preset person`, when it drew fewer pairs of feet; the cards of the others tell their trainings
 (`springfoot.agents.policies.cards`)."""
 POLICY_ENTRIES = frozenset({"format_version", "network", "settings", "fingerprint"})
 """Entries of a policy's header."""

@@ -24,6 +24,7 @@ def test_files_changed_at_random_are_read_or_refused_in_one_line():
     said = run("fuzz_readers", "--seconds", "6")
     assert "FAILED" not in said and " MB beyond the imports" in said
     assert sum(": " in line and " refused, " in line for line in said.splitlines()) >= 13
+    assert ": 0 refused, 0 read" not in said
 
 
 @pytest.mark.slow

@@ -35,6 +35,7 @@ def test_a_library_learns_to_walk_better(tmp_path):
 def test_what_sb3_trains_is_a_policy_of_the_task(tmp_path):
     untrained, trained = (trained_by("sb3", tmp_path / str(timesteps), timesteps) for timesteps in (0, 2_048))
     assert all(not np.array_equal(*pair) for pair in zip(trained.weights, untrained.weights, strict=True))
+    assert trained.observation_mean.any()  # of VecNormalize
 
 
 @pytest.mark.slow
