@@ -33,6 +33,13 @@ def test_masses_and_lengths_are_the_bodys(body):
 
 
 @pytest.mark.parametrize("body", BODIES)
+def test_a_load_is_seen_where_there_is_one(body):
+    model = build_model(body, loaded=True)
+    (load,) = np.flatnonzero(model.geom_bodyid == model.body("load").id)
+    assert (model.geom_rgba[load, 3] > 0) == (body.carried_mass > 0)
+
+
+@pytest.mark.parametrize("body", BODIES)
 def test_standing_straight_the_com_is_the_bodys(body):
     model = build_model(body)
     data = mujoco.MjData(model)

@@ -130,6 +130,8 @@ def test_gaps_at_the_ends_are_left_out_and_others_named(tmp_path):
     assert ends.strides and whole.strides and 2 < ends.strides < whole.strides
     with pytest.raises(SpringfootError, match=r"mid\.c3d, frame 501, left knee: a gap"):
         read_gait(laboratory(tmp_path / "mid.c3d", gap=slice(500, 510)))
+    with pytest.raises(SpringfootError, match=r"both\.c3d, frame 501, left knee: a gap"):
+        read_gait(laboratory(tmp_path / "both.c3d", gap=[*range(150), *range(500, 510)]))
 
 
 def test_without_its_library_the_extra_is_named(tmp_path, monkeypatch):

@@ -60,6 +60,14 @@ def test_zmp_recomputed_from_the_motion_stays_inside_the_support(arguments):
         assert np.all(zmp >= rear - tolerance) and np.all(zmp <= front + tolerance)
 
 
+def test_two_feet_support_from_the_trailing_toe_to_the_leading_foot():
+    plan = plan_of()
+    phase = PHASE[PHASE < plan.double_support / plan.step_time]
+    rear, front = plan.support(phase)
+    np.testing.assert_allclose(rear, plan.feet.on_ground(phase / 2 + 0.5)[0] - plan.step_length)
+    np.testing.assert_allclose(front, plan.feet.on_ground(phase / 2)[1])
+
+
 def test_planned_zmp_runs_straight_across_and_then_along_the_stance_foot():
     plan = plan_of()
     times = np.array([0.0, plan.double_support, plan.step_time])
