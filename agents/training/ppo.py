@@ -163,7 +163,7 @@ class Learner:
 
     def restore(self, arrays: dict[str, np.ndarray]) -> None:
         """Continue from `arrays` as `state` returns them; raise `SpringfootError` if they do not fit this learner."""
-        subject = "the training state"  # of the errors
+        subject = "the training state"  # its name in errors
         require_bounded(subject, arrays)
         require_moments(subject, arrays, len(list(self.ppo.policy.parameters())))
         try:
@@ -185,7 +185,7 @@ class Learner:
                 for item in ("mean", "var", "count"):
                     value = arrays[f"{name}.{item}"]
                     _require_shape(f"{name}.{item}", value, np.shape(getattr(statistics, item)))
-                    setattr(statistics, item, value if value.shape else float(value))  # a count is a number
+                    setattr(statistics, item, value if value.shape else float(value))  # of shape (): a plain number
         except (KeyError, IndexError, ValueError, RuntimeError) as error:
             reason = " ".join(str(error).split())
             raise SpringfootError(f"{subject} does not fit its configuration: {reason}") from None

@@ -48,7 +48,7 @@ class Tables(NamedTuple):
 
 @kernel
 def begin_window(controls, bodies, control, tables, springs, walking) -> None:
-    """Begin a control window: put stiffness and rest angles of all joints into the control; arguments as of
+    """Begin a control window: put stiffness and rest angles of all joints into the control; arguments as in
     `begin_step`."""
     tables = Tables(*tables)
     # Ankles and toes, then hips and knees.
@@ -84,7 +84,7 @@ def _average_forces(tasks, forces, running) -> None:
     """Set `force` of environments `running` (N,) to the mean of their contact forces in the step, which the observation
     shows and with which the next step's `impact` compares.
 
-    `tasks` is (N,) of `TASK_ROW`, `forces` as of `end_window`.
+    `tasks` is (N,) of `TASK_ROW`, `forces` as in `end_window`.
     """
     for i in range(len(tasks)):
         if not running[i]:
@@ -119,7 +119,7 @@ def begin_step(controls, bodies, control, tables, schedule, springs, factor, wal
 
 @kernel
 def next_window(controls, physics, forces, window, control, tables, springs, walking) -> None:
-    """End window number `window` and begin the next; arguments as of `end_window` and `begin_step`."""
+    """End window number `window` and begin the next; arguments as in `end_window` and `begin_step`."""
     end_window(controls, physics, forces, window, walking)
     begin_window(controls, Physics(*physics).bodies, control, tables, springs, walking)
 
@@ -129,7 +129,7 @@ def end_step(controls, tasks, physics, forces, target, task, walking, running, o
     """End the last control window, judge the step and observe.
 
     Args:
-        controls, physics, forces: as of `end_window`.
+        controls, physics, forces: as in `end_window`.
         tasks: (N,) of `TASK_ROW`.
         target: (R, SAMPLES, 2, C) of `TARGET`, of a `PhaseTable`.
         task: (1,) of `TASK_OPTIONS`.

@@ -69,12 +69,13 @@ def foot_lines(feet: Sequence[Feet]) -> FootLines:
     """
     tables = _torque_lines(feet)
     schedules = _schedules(feet)
-    most_points = max([2, *map(len, tables)])  # a line has two at least, also the empty one
+    most_points = max([2, *map(len, tables)])  # kernels read two at least, also of the row that no foot uses
     lines = np.full((max(len(tables), 1), most_points, 3), np.inf)
     for line, table in zip(lines, tables, strict=False):
         angle, torque = np.array(table).T
         fall = -np.diff(torque) / np.diff(angle)
-        line[: len(table)] = np.stack([angle, torque, np.append(fall, fall[-1])], -1)  # beyond its end, as before it
+        falls = np.append(fall, fall[-1])  # the last slope goes on beyond the line's end
+        line[: len(table)] = np.stack([angle, torque, falls], -1)
     curves = [np.concatenate(schedule.at(GRID), -1) for schedule in schedules] or [np.zeros((SAMPLES, 4))]
     return FootLines(lines, PhaseTable(np.stack(curves)).table)
 

@@ -59,11 +59,13 @@ def _between(low, high, weight):
 
 @kernel
 def _compute_gains(constants, rows):
-    """Compute the gains of N bodies from the `constants` (R,) of `GAINS` of the settings' body, one for each row of the
-    tables.
+    """Compute the gains of N bodies.
 
-    The gains are linear between the two rows nearest to the commanded speed, and scale with the body. `rows` is (N,) of
-    `CONTROL_ROW`; `legs.gains` is filled.
+    They are linear between those of the two tabulated speeds nearest to the commanded speed, and scale with the body.
+
+    Args:
+        constants: (R,) of `GAINS`, those of the settings' body, one for each row of the tables.
+        rows: (N,) of `CONTROL_ROW`, one for each body; `legs.gains` is filled.
     """
     for i in range(len(rows)):
         subject = rows[i].subject

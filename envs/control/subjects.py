@@ -54,12 +54,12 @@ def _approach(most, running, subjects):
 def _find_places(ids, speeds, first, subjects):
     """Set the `place` of environments `ids` (K,) in tables over `speeds` (G,) [m/s], by their Froude-equal speeds.
 
-    `first` (N,) is the first row of each environment's variant; `subjects` (N,) of `SUBJECT`.
+    `first` (N,) is the first row of each environment's variant of the leg constants; `subjects` (N,) of `SUBJECT`.
     """
     last = len(speeds) - 1
     for i in ids:
-        equal_speed = subjects[i].speed / subjects[i].scale.time  # of the settings' body
-        lower = 0  # index of the tabulated speed below, so that a next one follows if there are two
+        equal_speed = subjects[i].speed / subjects[i].scale.time  # of the settings' body: speeds scale as times do
+        lower = 0  # index of the tabulated speed below, never the last one where there are two
         while lower < last - 1 and equal_speed >= speeds[lower + 1]:
             lower += 1
         weight = 0.0
@@ -217,7 +217,7 @@ class Subjects:
         return self._table_bodies[self.proportions[index]]
 
     def check(self, given: Mapping[str, Any] | None) -> None:
-        """Raise `SpringfootError` for a `body` in `given`, as of `reset`, that is no index in `drawn_bodies`."""
+        """Raise `SpringfootError` for a `body` in `given`, as in `reset`, that is no index in `drawn_bodies`."""
         bodies = self._settings.drawn_bodies
         for index in (given or {}).get("body", ()):
             if bodies is None:

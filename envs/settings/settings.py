@@ -443,8 +443,8 @@ def plan_file_of(settings: BipedSettings) -> Path | None:
 def reference_gait(settings: BipedSettings, speed: float | None = None) -> HumanGait:
     """Return people's gait, or that of `settings.human`, for the body's height at `speed` [m/s], the settings' if None.
 
-    People's data come from the setting `people_file`, or from the package; step time and length are those of the
-    setting `step_time_ratio`.
+    People's data come from the setting `people_file`, or from the package; its step time and length are
+    multiplied by the setting `step_time_ratio`.
     """
     people = PEOPLE_FILE if settings.people_file is None else Path(settings.people_file)
     speed = settings.speed if speed is None else speed

@@ -26,7 +26,7 @@ TARGET = np.dtype(
         ("force", float, 2),  # ground reaction force (forward, up), at the middle of the step [body weights]
         ("force_band", float, 2),  # how far from it is still in range
         ("com", float, 2),  # the plan's CoM (x, z) [m], x from this leg's ankle and less its mean advance
-        ("zmp", float),  # the plan's ZMP at the middle of the step [m], x as of `com`
+        ("zmp", float),  # the plan's ZMP at the middle of the step [m], x as in `com`
         ("speed", float),  # the plan's forward speed of the CoM [m/s]
         ("stride_length", float),  # of the plan [m], the same at every phase
     ]

@@ -66,8 +66,8 @@ class LiveScene:
         self._begin()
 
     def show(self) -> None:
-        """Draw the body in its present posture, shifted back by the way it has walked; build the scene of a new model
-        before."""
+        """Build the scene if the model is new; draw the body in its present posture, shifted back by the way it has
+        walked."""
         session = self._session
         if session.model is not self._model:
             self._server.scene.reset()

@@ -69,7 +69,7 @@ def strides_within(foot: Contacts, steady: tuple[float, float]) -> NDArray:
 def stride_curves(series: dict[str, NDArray], side: int, body: Body, strides: NDArray) -> NDArray:
     """Return one leg's curves over percent of its strides, (S, 101, C) in the order of `GAIT_CYCLE_COLUMNS`.
 
-    `series` are those of one episode, `side` is 0 left, 1 right, `strides` (S, 3) as of `strides_within`. Curves are
+    `series` are those of one episode, `side` is 0 left, 1 right, `strides` (S, 3) as in `strides_within`. Curves are
     interpolated between the 100 Hz samples.
     """
     begin, _, end = strides.T

@@ -38,7 +38,7 @@ def policy_data(
 ) -> dict[str, Any]:
     """Return the page's data of one policy as JSON values: numbers, panels of curves, loops, two strides of the body.
 
-    `words_of` as of `figure_data`. The page's table and verdict come beside it (`report_page`).
+    `words_of` as in `figure_data`. The page's table and verdict come beside it (`report_page`).
     """
     human = reference_gait(recording.settings)
     by_leg = feet_differ(recording.settings)

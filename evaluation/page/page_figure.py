@@ -153,7 +153,7 @@ def foot_words(setting: FootSetting) -> str:
 def walker_words(settings: BipedSettings, words_of: Callable[[FootSetting], str] | None = None) -> str:
     """Return body, feet and a learned person of the settings in words, such as "1.7 m, 63 kg, both feet intact".
 
-    `words_of` as of `figure_data`.
+    `words_of` puts a foot into words, `foot_words` by default.
     """
     height, mass = (
         f"{bounds[0]:g} to {bounds[1]:g}" if bounds else f"{value:g}"

@@ -142,7 +142,7 @@ def spoken_verdict(
     Args:
         metrics: content of metrics.json.
         legs: of `leg_numbers`.
-        words_of: as of `write_page`.
+        words_of: as in `write_page`.
     """
     environment = metrics["environment"]
     settings = settings_from(**environment)

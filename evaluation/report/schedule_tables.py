@@ -49,7 +49,7 @@ def schedule_csv(policy: str, body: Body, speed: float, equilibrium: str, curves
     """Return the CSV text of the stiffness that was recorded from the policy `policy`, a row for each percent of the
     stride.
 
-    `curves` are (101,) by column as of `schedule_curves`, `equilibrium` is the setting that they need.
+    `curves` are (101,) by column as in `schedule_curves`, `equilibrium` is the setting that they need.
     """
     # Columns that say where the curves come from, the same in every row.
     origin = {

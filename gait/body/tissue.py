@@ -50,7 +50,7 @@ def passive_moments(body: Body, angle: NDArray) -> NDArray:
 
 
 def tissue_moments(hip: Any, knee: Any, ankle: Any, toe: Any) -> Any:
-    """Return the passive moments of hip, knee, ankle and toe [N m] at 1.70 m and 63 kg, signs as of `passive_moments`.
+    """Return the passive moments of hip, knee, ankle and toe [N m] at 1.70 m and 63 kg, signs as in `passive_moments`.
 
     The angles [rad] are numbers or arrays: the environment's kernels compile this function.
     """

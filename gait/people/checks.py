@@ -157,7 +157,7 @@ def require_plausible(
 def require_plausible_legs(walk: MeasuredWalk, side: str, mass: float | None, people: HumanGait) -> None:
     """Raise `SpringfootError` unless each leg alone walks as people do: a mean of both would hide a wrong one.
 
-    Legs with too few strides for a mean are not checked. Arguments as of `cut_strides`.
+    Legs with too few strides for a mean are not checked. Arguments as in `cut_strides`.
     """
     for leg, series in walk.legs.items():
         if side not in ("both", leg):
@@ -165,7 +165,7 @@ def require_plausible_legs(walk: MeasuredWalk, side: str, mass: float | None, pe
         name = f"{walk.name}, the {leg} leg"
         if _bears_downward(series.get("grf_vertical", np.zeros(1))):
             raise SpringfootError(
-                f"{name}: the vertical force is below 0 where it bears: up must be positive; {AS_IT_IS}"
+                f"{name}: the vertical force is below 0 while the foot bears weight: up must be positive; {AS_IT_IS}"
             )
         try:
             _, curves = cut_strides(walk, leg, mass)
@@ -173,6 +173,7 @@ def require_plausible_legs(walk: MeasuredWalk, side: str, mass: float | None, pe
             continue
         mean = {curve: values.mean(axis=0) for curve, values in curves.items()}
         columns = COLUMNS | {curve: column for (side_of, curve), column in walk.columns.items() if side_of == leg}
+        # What the file gives unscaled, `cut_strides` has divided by the mass.
         divided = {curve for side_of, curve in walk.unscaled if side_of == leg}
         require_plausible(name, mean, people, mass_given=is_mass_given(walk, mass), columns=columns, divided=divided)
 
@@ -197,7 +198,7 @@ def _doubts(
 ) -> Iterator[str]:
     """Yield texts that say why mean curves (101,) cannot be right, the surest first.
 
-    `usual` are people's curves, the rest is as of `require_plausible`.
+    `usual` are people's curves, the rest is as in `require_plausible`.
     """
     if "knee" in mean and mean["knee"].mean() > LARGEST_KNEE:
         yield (
@@ -235,7 +236,7 @@ def _doubts(
 
 
 def _doubts_of_noise(mean: Curves, usual: Curves, columns: Mapping[str, str]) -> Iterator[str]:
-    """Yield a text for each mean curve (101,) with more noise than `ROUGHNESS`; arguments as of `_doubts`."""
+    """Yield a text for each mean curve (101,) with more noise than `ROUGHNESS`; arguments as in `_doubts`."""
     for curve, values in mean.items():
         jump = float(np.median(np.abs(np.diff(values, 2))))
         if jump > ROUGHNESS[_kind(curve)] * max(np.ptp(values), np.ptp(usual[curve])):
@@ -247,7 +248,7 @@ def _doubts_of_size(
 ) -> Iterator[str]:
     """Yield a text for each curve that is too large or too small, with the mistaken unit if there is one.
 
-    `sizes` are excursions over people's, the rest is as of `_doubts`.
+    `sizes` are excursions over people's, the rest is as in `_doubts`.
     """
     for curve, size in sizes.items():
         kind = _kind(curve)
@@ -287,7 +288,7 @@ def _mistaken_unit(kind: str, size: float, divided: bool) -> str:
 
 
 def _doubts_of_zero(mean: Curves, usual: Curves, columns: Mapping[str, str]) -> Iterator[str]:
-    """Yield a text for each angle whose mean is far from people's, as if counted from another zero; arguments as of
+    """Yield a text for each angle whose mean is far from people's, as if counted from another zero; arguments as in
     `_doubts`."""
     for curve in (name for name in mean if name in ANGLE_CURVES):
         offset = float(mean[curve].mean() - usual[curve].mean())
@@ -346,7 +347,7 @@ def _guess(
 ) -> str:
     """Return words for the change that makes a curve most like people's: turned, reversed, shifted, or another's name.
 
-    `likeness` (100,) is the curve's `_likeness`, `backward` the correlation of the reversed curve; `columns` as of
+    `likeness` (100,) is the curve's `_likeness`, `backward` the correlation of the reversed curve; `columns` as in
     `_doubts`.
     """
     # The best shift; shifts near 0 and 100 % do not count.
@@ -365,7 +366,7 @@ def _guess(
 
 
 def _doubts_of_forces(mean: Curves, columns: Mapping[str, str]) -> Iterator[str]:
-    """Yield a text if the vertical force does not bear half a body, or does not fit the ankle's moment; arguments as of
+    """Yield a text if the vertical force does not bear half a body, or does not fit the ankle's moment; arguments as in
     `_doubts`."""
     if "grf_vertical" not in mean:
         return

@@ -101,7 +101,7 @@ def sample(series: NDArray, times: NDArray, tick: float, first: float = 0.0) -> 
 def on_percent(series: NDArray, begin: NDArray, end: NDArray, tick: float, first: float = 0.0) -> NDArray:
     """Return curves (S, 101, ...) of `series` (T, ...) over percent 0..100 of S intervals.
 
-    They last from `begin` (S,) to `end` (S,) [s]; `tick` and `first` as of `sample`.
+    They last from `begin` (S,) to `end` (S,) [s]; `tick` and `first` as in `sample`.
     """
     times = begin[:, None] + (end - begin)[:, None] * (PERCENT / 100)
     return sample(series, times, tick, first)

@@ -98,7 +98,7 @@ def read_person(
     """Return one person's walk from its files.
 
     `speed` [m/s] goes before that of the files. Of a walk over time the first `skip` seconds are left out; None leaves
-    out `WARM_UP` of a walk that lasts `LONG_WALK`. The rest is as of `read_gait`, which leaves out nothing.
+    out `WARM_UP` of a walk that lasts `LONG_WALK`. The rest is as in `read_gait`, which leaves out nothing.
 
     A leg with too few strides for a spread is kept, with all its strides. Raises `SpringfootError` as `read_gait` does,
     for forces that bear a mass outside `MASS_RANGE`, for a toe's moment larger than the ankle's, and for a

@@ -165,7 +165,7 @@ def read_gait(
 def read_files(paths: Sequence[str | Path], columns: Mapping[str, str] = NO_NAMES) -> Table | MeasuredWalk:
     """Return the content of files of one walk: a table of mean curves over percent, or the walk over time.
 
-    `columns` as of `read_gait`. Raises `SpringfootError` for an unreadable file, for a column that is in none, and for
+    `columns` as in `read_gait`. Raises `SpringfootError` for an unreadable file, for a column that is in none, and for
     a name that means nothing here.
     """
     for ours in columns:
@@ -362,7 +362,7 @@ def people_at(speed: float | None) -> HumanGait:
 def _with_series(gait: OwnGait, mean: Series, sd: Series, trust_units: bool, mass_given: bool = False) -> OwnGait:
     """Return `gait` with series fitted to mean curves and spreads (101,); raise `SpringfootError` for implausible ones.
 
-    `trust_units` accepts curves that differ from people's; `mass_given` as of `require_plausible`.
+    `trust_units` accepts curves that differ from people's; `mass_given` as in `require_plausible`.
     """
 
     def fit(curves: Series) -> dict[str, list]:

@@ -233,7 +233,7 @@ def cut_strides(walk: MeasuredWalk, side: str = "both", mass: float | None = Non
 
 
 def strides_of_legs(walk: MeasuredWalk, side: str = "both", mass: float | None = None) -> dict[str, LegStrides]:
-    """Cut each leg of a walk into strides; arguments and errors as of `cut_strides`."""
+    """Cut each leg of a walk into strides; arguments and errors as in `cut_strides`."""
     legs = _legs_as_read(walk, side, mass)
     borne = borne_mass(walk) if mass is None else None
     mass = borne.mass if borne else mass
@@ -407,7 +407,7 @@ def borne_mass(walk: MeasuredWalk) -> BorneMass | None:
 def _strides_of_leg(walk: MeasuredWalk, side: str, weight: float | None) -> NDArray:
     """Return (S, 3) heel strike, toe-off, next heel strike [s] of one leg, by the first method that finds enough.
 
-    Methods: the vertical force, the events in the file, the leg's motion. `weight` as of `_legs_by_weight`.
+    Methods: the vertical force, the events in the file, the leg's motion. `weight` as in `_legs_by_weight`.
     """
     leg = walk.legs[side]
     methods: tuple[Callable[[], Contacts | None], ...] = (
@@ -431,7 +431,7 @@ def _strides_of_leg(walk: MeasuredWalk, side: str, weight: float | None) -> NDAr
 
 
 def _contacts_of_force(walk: MeasuredWalk, leg: Series, weight: float | None) -> Contacts | None:
-    """Return the events of a leg by its vertical force; None without one. `weight` as of `_legs_by_weight`."""
+    """Return the events of a leg by its vertical force; None without one. `weight` as in `_legs_by_weight`."""
     if "grf_vertical" not in leg:
         return None
     threshold = CONTACT_THRESHOLD_BW * (weight or _body_weight(leg["grf_vertical"]))
@@ -526,14 +526,14 @@ def _body_weight(force: NDArray) -> float:
 
 def _on_plate(vertical: NDArray, weight: float | None) -> NDArray:
     """Return (S,) True for strides whose stance was on a force plate; `vertical` (S, 101) is their vertical force, and
-    `weight` as of `_legs_by_weight`."""
+    `weight` as in `_legs_by_weight`."""
     low, high = WEIGHT_BEARING
     # A foot on a plate bears most of the body weight there; 0.3 of it is beyond what noise shows.
     return vertical[:, low : high + 1].min(axis=1, initial=np.inf) > 0.3 * (weight or _body_weight(vertical))
 
 
 def _ends_abruptly(vertical: NDArray, weight: float | None) -> NDArray:
-    """Return (S,) True for strides whose force falls by `ABRUPT_UNLOADING` at once to next to nothing; arguments as of
+    """Return (S,) True for strides whose force falls by `ABRUPT_UNLOADING` at once to next to nothing; arguments as in
     `_on_plate`."""
     weight = weight or _body_weight(vertical)
     begin = WEIGHT_BEARING[0]

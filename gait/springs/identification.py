@@ -169,7 +169,7 @@ def _samples_by_phase(
 ) -> list[tuple[tuple[float, float], tuple[NDArray, NDArray, NDArray]]]:
     """Return the samples of each phase: its two bounds, and torque, angle and velocity (n,) in it without the margin.
 
-    Arguments are as of `identify`; raises `SpringfootError` for bad ones.
+    Arguments are as in `identify`; raises `SpringfootError` for bad ones.
     """
     arrays = [np.asarray(values, float) for values in (torque, angle, velocity, phase)]
     shapes = [values.shape for values in arrays]

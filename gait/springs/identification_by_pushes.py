@@ -170,7 +170,7 @@ def _samples(
 def _phase_spring(data: _Data, low: float, high: float, margin: float, spacing: float | None) -> PushedSpring:
     """Identify the spring of the phase from `low` to `high` [stride], with the verdict whether it is a spring.
 
-    K and beta are None if trials are too few or the motion is too small. `margin` and `spacing` are as of
+    K and beta are None if trials are too few or the motion is too small. `margin` and `spacing` are as in
     `identify_pushed`.
     """
     # Samples of the phase, by bins of equal phase; bins with few samples are left out.

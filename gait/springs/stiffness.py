@@ -130,7 +130,7 @@ def ankle_events(phase: ArrayLike, angle: ArrayLike, toe_off: float) -> dict[str
 def toe_events(phase: ArrayLike, angle: ArrayLike, toe_off: float) -> dict[str, float]:
     """Return the phases of heel strike, heel-off, maximum dorsiflexion and toe-off, in this order, from the toe angle.
 
-    Arguments as of `ankle_events`, toe up positive. Maximum dorsiflexion is the largest angle in the second half of
+    Arguments as in `ankle_events`, toe up positive. Maximum dorsiflexion is the largest angle in the second half of
     stance, since a toe also lands raised. The toe rises to it from its lowest angle after a quarter of stance, when the
     foot is flat; heel-off is the last phase at which it has made at most `HEEL_OFF_RISE` of that rise.
     """
@@ -221,7 +221,7 @@ def thesis_schedule(
 def with_swing(
     schedule: StiffnessSchedule, body: Body, swing: tuple[tuple[float, float], ...] = THESIS_SWING
 ) -> StiffnessSchedule:
-    """Return a schedule of `schedule_from_curves` with other springs in swing, `swing` as of `thesis_schedule`."""
+    """Return a schedule of `schedule_from_curves` with other springs in swing, `swing` as in `thesis_schedule`."""
     segments = []
     for joint, (k, rest_deg) in zip(SPRINGS, swing, strict=True):
         *stance, last = getattr(schedule, joint)
@@ -232,7 +232,7 @@ def with_swing(
 def _stance_part(phase: ArrayLike, angle: ArrayLike, toe_off: float) -> tuple[NDArray, NDArray]:
     """Return phases and angles from heel strike to `toe_off`, with a sample at `toe_off` itself.
 
-    Arguments as of `ankle_events`. Raises `SpringfootError` for curves of another form.
+    Arguments as in `ankle_events`. Raises `SpringfootError` for curves of another form.
     """
     require_within("toe_off", toe_off, (0.0, 1.0))
     phase, angle = _checked_curves(phase, angle)

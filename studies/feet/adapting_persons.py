@@ -11,7 +11,7 @@ from springfoot.evaluation.recording import policy_and_settings
 def person_and_settings(name: str, given: dict[str, Any]) -> tuple[PolicyFunction, BipedSettings]:
     """Return the policy `name`, which moves a person, and the settings to walk it with.
 
-    `given` are settings that replace the policy's own, as of `policy_and_settings`.
+    `given` are settings that replace the policy's own, as in `policy_and_settings`.
 
     Raises `SpringfootError` for a policy that sets stiffness alone.
     """

@@ -80,7 +80,7 @@ def _walked_speeds(walks: Sequence[Sequence[_Walk]]) -> NDArray | None:
 
 
 def _episode_prices(price: str, walks: Sequence[Sequence[_Walk]]) -> NDArray:
-    """Return the prices (2, P, E) of `walks` in the column `price` of `TWO_PRICES`, axes as of `_walked_speeds`."""
+    """Return the prices (2, P, E) of `walks` in the column `price` of `TWO_PRICES`, axes as in `_walked_speeds`."""
     return np.array([[walk.prices(price) for walk in at_speed] for at_speed in walks])
 
 
@@ -344,7 +344,7 @@ def _where(asked: float, speed: float, walked: Sequence[NDArray | None]) -> str:
     """Return a sentence on the walked `speed` [m/s] of the comparison, and on the persons that do not reach the one
     `asked` for.
 
-    `walked` as of `common_speed`.
+    `walked` as in `common_speed`.
     """
     # Of each foot without a fall the fastest walk of its slowest person.
     fastest = [float(speeds.mean(-1).max(0).min()) for speeds in walked if speeds is not None]

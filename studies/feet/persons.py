@@ -215,7 +215,7 @@ def _falls(episodes: Sequence[DrawnEpisode]) -> str:
 
 
 def sound_table(rows: Sequence[dict[str, Any]]) -> str:
-    """Return the Markdown table of walks on sound feet; `rows` as of `Persons.sound_walk`."""
+    """Return the Markdown table of walks on sound feet; `rows` as in `Persons.sound_walk`."""
     head = ["sound feet", "falls", "walked m/s", "thigh / knee / ankle °", "forces r", "peak BW", "fibre work J/kg/m"]
     lines = []
     for row in rows:
@@ -238,7 +238,7 @@ def sound_table(rows: Sequence[dict[str, Any]]) -> str:
 
 
 def _drawn_csv(drawn: dict[str, dict[float, list[DrawnEpisode]]]) -> str:
-    """Return the CSV with a line for each drawn episode; `drawn` as of `drawn_table`."""
+    """Return the CSV with a line for each drawn episode; `drawn` as in `drawn_table`."""
     lines = [
         [name, push, episode.foot, episode.speed, episode.walked, int(episode.fell)]
         for name, pushed in drawn.items()

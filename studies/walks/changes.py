@@ -237,7 +237,7 @@ def curves_table(people: Sequence[Stride], walks: Mapping[str, Sequence[Stride]]
 
 
 def numbers_table(people: Sequence[Stride], walks: Mapping[str, Sequence[Stride]]) -> str:
-    """Return the Markdown table of the changes of `QUANTITIES`; `people` and `walks` as of `curves_table`.
+    """Return the Markdown table of the changes of `QUANTITIES`; `people` and `walks` as in `curves_table`.
 
     The last lines count right signs and right sizes, of the quantities that change in people by more than their spread.
     """

@@ -178,7 +178,7 @@ def compared_rows(speed: float, measured: Mapping[str, Measured]) -> list[dict[s
 
 def beside_rows(speed: float, measured: Mapping[str, Measured]) -> list[dict[str, Any]]:
     """Return a row for each published effect that stands beside those compared (`BESIDE`), at a walked `speed` [m/s]:
-    as published, as here [%], and the agreement of the signs (`sign_is`). `measured` as of `compared_rows`."""
+    as published, as here [%], and the agreement of the signs (`sign_is`). `measured` as in `compared_rows`."""
     published = {row["name"]: row for row in published_effects()}
     rows = []
     for name, effect in BESIDE.items():

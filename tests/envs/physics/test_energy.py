@@ -167,13 +167,14 @@ def test_energy_closes_with_springs_that_act_one_way_and_they_give_back_what_the
     assert abs(change - works) / settings.mass / 7 <= 0.01  # seven strides
 
 
-def test_changes_of_springs_are_those_that_every_step_reports():
-    policy, settings = policy_and_settings("schedule", {"episode_seconds": 3.0})
+@pytest.mark.parametrize("given", [{}, {"speed": 0.9, "stop_at": 2.0}], ids=["walks", "stops"])
+def test_changes_of_springs_are_those_that_every_step_reports(given):
+    policy, settings = policy_and_settings("schedule", {"episode_seconds": 7.0} | given)
     biped, ticks, reported = Biped(settings, 2), [], {}
     biped.reset(np.arange(2), [0, 1])
     biped.on_tick = ticks.append
     observation = biped.observe()
-    for _ in range(100):
+    for _ in range(300 if given else 100):
         result = biped.step(policy(observation))
         observation = result.observation
         for source in ("stiffness", "equilibrium"):

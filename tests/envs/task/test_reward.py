@@ -45,6 +45,13 @@ def test_planned_speed_is_the_derivative_of_the_planned_com(thesis_body):
     np.testing.assert_allclose(thesis_body.tracking(measured, phase), 0.0, atol=2e-4)
 
 
+def test_the_planned_com_is_that_of_the_plan_wherever_the_body_is(thesis_body):
+    planned = thesis_body.measurement(PHASES).com
+    moved = planned + np.array([0.03, -0.015])
+    task, _, bodies = thesis_body.at(PHASES, thesis_body.measurement(PHASES, com=moved))
+    np.testing.assert_allclose(task.planned_com(bodies), planned, atol=2e-4)
+
+
 @pytest.mark.parametrize("height", [1.7, 1.3])
 def test_the_zmp_term_is_of_the_cop_of_both_feet_amid_the_step(height):
     setup, heavy = Setup(height=height, mass=45, speed=1.0), 3.0

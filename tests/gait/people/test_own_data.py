@@ -323,7 +323,7 @@ def test_interchanged_legs_and_wrong_units_are_noticed(tmp_path):
     [
         ({"knee_flexion_deg_right": np.pi / 180}, "the right leg: knee_flexion_deg goes from"),
         ({"ankle_dorsiflexion_deg_left": -1.0}, "the left leg: ankle_dorsiflexion_deg is opposite to people's"),
-        ({"grf_vertical_bw_right": -1.0}, "the right leg: the vertical force is below 0 where it bears"),
+        ({"grf_vertical_bw_right": -1.0}, "the right leg: the vertical force is below 0 while the foot bears weight"),
     ],
 )
 def test_one_leg_in_other_units_or_signs_is_refused_though_the_mean_of_both_looks_right(tmp_path, wrong, words):

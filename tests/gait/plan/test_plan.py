@@ -62,7 +62,8 @@ def test_zmp_recomputed_from_the_motion_stays_inside_the_support(arguments):
 
 def test_two_feet_support_from_the_trailing_toe_to_the_leading_foot():
     plan = plan_of()
-    phase = PHASE[PHASE < plan.double_support / plan.step_time]
+    double_support = plan.double_support / plan.step_time
+    phase = PHASE[double_support > PHASE]
     rear, front = plan.support(phase)
     np.testing.assert_allclose(rear, plan.feet.on_ground(phase / 2 + 0.5)[0] - plan.step_length)
     np.testing.assert_allclose(front, plan.feet.on_ground(phase / 2)[1])
