@@ -9,7 +9,7 @@ from springfoot.envs.control.equilibrium import foot_tables
 from springfoot.envs.control.phase_table import GRID
 from springfoot.envs.control.reference_walk import reference_walks, rows
 from springfoot.envs.control.stiffness_control import stiffness_ranges
-from springfoot.envs.physics.model import ANKLE, KNEE, SIDES
+from springfoot.envs.physics.model import ANKLE, KNEE, LEFT, SIDES
 from springfoot.envs.settings.settings import settings_from
 from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.gait.body.tissue import (
@@ -118,3 +118,11 @@ def test_a_tendon_neither_bounds_nor_prices_an_adaptive_prosthesis():
         assert named["stiffness/ankle_right"] == pytest.approx(stiffness_ranges(biped.settings, biped.body)[1][0])
         charged.append(named["reward/stiffness"])
     assert charged[0] == charged[1] > 1.0
+
+
+def test_a_tendon_bounds_the_calf_beside_an_adaptive_prosthesis():
+    biped = Biped(settings_from(ankle_tendon=150.0, right_foot="adaptive"), 1)
+    biped.reset(np.array([0]), [0])
+    most = biped.body.stiffness_scale * TENDON_SHARE * 150.0 + tissue(biped)[0, LEFT]
+    info = biped.step(np.ones((1, 4))).info
+    assert info["stiffness/ankle_left"][0] <= most < info["stiffness/ankle_right"][0]

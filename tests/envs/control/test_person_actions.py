@@ -205,3 +205,14 @@ def test_the_aim_rests_on_the_commanded_speed_while_a_body_stands_and_at_a_reset
     assert walking.subjects.rows["person"]["aim"][0] != 0.0
     walking.reset(np.arange(1), [1])
     assert walking.subjects.rows["person"]["aim"][0] == 0.0
+
+
+def test_the_aim_of_a_body_left_out_stays_and_that_of_the_other_moves() -> None:
+    biped = started(BipedSettings(acts="both", aim_rate=2.0), 2)
+    biped.step(np.zeros((2, 10)))
+    before = biped.subjects.rows["person"]["aim"].copy()
+    biped.step(np.zeros((2, 10)), np.array([True, False]))
+    after = biped.subjects.rows["person"]["aim"]
+    lacking = biped.settings.speed - biped.measurement.com_velocity[0, 0]
+    assert after[0] == pytest.approx(before[0] + 2.0 * biped.dt * lacking, abs=1e-12)
+    assert after[1] == before[1] != 0.0
