@@ -90,7 +90,7 @@ def fuzz(reader: Reader, folder: Path, seconds: float, first_seed: int) -> Found
     )
     @given(st.integers(0, len(reader.bases) - 1), st.integers(0, 2**32 - 1), st.none() | st.binary(max_size=512))
     def one(base: int, drawn: int, alone: bytes | None) -> None:
-        if time.monotonic() < until or not found.read + found.refused:
+        if time.monotonic() < until or not (found.read + found.refused or found.failures):
             other = alone is not None and drawn % 8 == 0  # mostly a file that was whole
             content = alone if other else changed(reader.bases[base], np.random.default_rng(drawn))
             path.write_bytes(content or b"")

@@ -51,7 +51,10 @@ WORLD: tuple[dict[str, Any], ...] = (
 """Conditions of `--world`. Proportions are ± 2 SD of adults; loads are 10 and 20 kg for 63 kg."""
 QUASI_SPEED = 1.35
 """Commanded speed [m/s] at which people's quasi-stiffness, which is not tuned, walks about 1.2 m/s."""
-COMPARABLE = ("speed", "reward_weights", "forward_force_weight", "knee_weight")
+COMPARABLE = (
+    *("speed", "cadence", "guide", "people_file", "plan_file", "human"),
+    *("reward_weights", "forward_force_weight", "knee_weight"),
+)
 """Settings that rows must share for a comparison of their returns."""
 SIGNIFICANT = 0.05
 """Largest p of McNemar's test with which a row falls less often than another."""
@@ -91,7 +94,7 @@ class Row:
     def difference(self, first: "Row") -> tuple[float, float, float] | None:
         """Return the mean return of `first` less this row's, and the ends of its 95 % interval.
 
-        None if the rows differ in commanded speed or reward, so that their returns do not compare.
+        None if the rows differ in a setting of `COMPARABLE`.
         """
         if any(self.metrics["environment"].get(name) != first.metrics["environment"].get(name) for name in COMPARABLE):
             return None
