@@ -23,7 +23,7 @@ from tqdm import tqdm
 
 from springfoot.agents.policies.baselines import PolicyFunction
 from springfoot.command_line import exit_code
-from springfoot.envs.physics.timing import WINDOWS_PER_STEP
+from springfoot.envs.physics.timing import WINDOWS_PER_ACTION_STEP
 from springfoot.envs.settings.settings import BipedSettings, body_of
 from springfoot.errors import require_count
 from springfoot.evaluation.numbers.metrics import Gait, measure
@@ -49,7 +49,7 @@ def costs(models: list[mujoco.MjModel], walk: Walk, rounds: int) -> NDArray:
             for index, each in enumerate(physics):
                 each.place(walk, step)
                 spent[index, round_, step] = each.step(walk, step)
-    return 1e6 * spent[:, 1:].reshape(len(models), -1) / (WINDOWS_PER_STEP * walk.actions.shape[1])
+    return 1e6 * spent[:, 1:].reshape(len(models), -1) / (WINDOWS_PER_ACTION_STEP * walk.actions.shape[1])
 
 
 def walked(

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from springfoot.envs.batch.step_result import Tick
 from springfoot.envs.control.stiffness_control import action_of
 from springfoot.envs.physics.model import build_model
-from springfoot.envs.physics.timing import CONTROL_WINDOW, WINDOWS_PER_STEP
+from springfoot.envs.physics.timing import CONTROL_WINDOW, WINDOWS_PER_ACTION_STEP
 from springfoot.envs.settings import BipedSettings
 from springfoot.envs.vector_env import SegmentedFootBipedVector
 from springfoot.gait.body.body import Body
@@ -21,7 +21,7 @@ from springfoot.gait.body.body import Body
 from .timing import Case, clock_cost
 
 SEED = 0
-STEP = WINDOWS_PER_STEP * CONTROL_WINDOW
+STEP = WINDOWS_PER_ACTION_STEP * CONTROL_WINDOW
 """Simulated time of one environment step [s]."""
 STUDY_TIMESTEP = 0.001
 """Physics step of the first throw-away study [s]; integrator, solver and cone as ours, flags as MuJoCo's default."""
@@ -38,7 +38,7 @@ class Walk:
     velocity: NDArray
     """(T, N, nv)."""
     controls: NDArray
-    """(T, WINDOWS_PER_STEP, N, nu) held in each control window."""
+    """(T, WINDOWS_PER_ACTION_STEP, N, nu) held in each control window."""
 
 
 def record_walk(num: int, steps: int) -> Walk:
@@ -64,7 +64,7 @@ def record_walk(num: int, steps: int) -> Walk:
         actions=np.stack(actions),
         position=np.stack(position),
         velocity=np.stack(velocity),
-        controls=np.stack(held).reshape(steps, WINDOWS_PER_STEP, num, -1),
+        controls=np.stack(held).reshape(steps, WINDOWS_PER_ACTION_STEP, num, -1),
     )
 
 

@@ -122,7 +122,7 @@ def _feet_of_all(name: str, feet: Any, num: int) -> NDArray:
         raise SpringfootError(
             f"reset option {name!r} must be a foot, or a list of one for each of {num} environments, got {quoted(feet)}"
         )
-    checked = np.empty(num, object)
+    checked = np.empty(num, object)  # np.array could make an axis of a foot's entries
     checked[:] = [foot_setting(f"reset option {name!r}", foot) for foot in listed]
     return checked
 

@@ -33,7 +33,8 @@ def form(observation: NDArray) -> str:
 
 
 def onnx_session(path: Path, observations: NDArray) -> tuple[Any, dict[str, str]]:
-    """Return onnxruntime's session of a file, and the `form`s of `observations` (N, D) that it fails on, with reasons.
+    """Return onnxruntime's session of a file, and for each of `FORMS` in which it fails on `observations` (N, D), the
+    reason.
 
     A child process with bounded time and memory opens the file and runs it on the observations first: time, memory and
     failures may depend on the numbers. Raises `SpringfootError` for a file that onnxruntime does not open, or not

@@ -55,15 +55,15 @@ class Learner:
 
     Raises `SpringfootError` for a GPU that torch does not find.
 
-    Weights are orthogonal, biases zero; with gain 0.01 on the action layer the mean action begins near 0. Observations
-    and rewards are normalised by their running statistics. With `mirrored` network and statistics are those of
-    `mirrored_network`.
+    As stable-baselines3 makes them, weights are orthogonal and biases zero; with gain 0.01 on the action layer the mean
+    action begins near 0. Observations and rewards are normalised by their running statistics. If the configuration is
+    `mirrored`, network and statistics come from the module `mirrored_network`.
     """
 
     def __init__(self, config: TrainingConfig, environments: VecEnv, seed: int) -> None:
         if config.device == "cuda" and not torch.cuda.is_available():
             raise SpringfootError("device cuda needs a GPU that torch finds; there is none, give cpu")
-        torch.set_num_threads(1)  # more compete with the threads of the physics, and are up to 200 times slower
+        torch.set_num_threads(1)  # more would compete with the physics' threads, up to 200 times slower
         self._environment = config.environment
         steps_of_20ms = config.environment.step_seconds / ACTION_STEP  # gamma and lambda are per 20 ms
         gamma = config.gamma**steps_of_20ms

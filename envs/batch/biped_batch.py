@@ -31,7 +31,7 @@ from ..physics.foot import Feet
 from ..physics.measurement import Measurement
 from ..physics.model import ACTIONS, JOINTS, PERSON_ACTIONS, SIDES
 from ..physics.simulation import MjData, MjModel, Simulation
-from ..physics.timing import CONTROL_WINDOW, WINDOWS_PER_STEP
+from ..physics.timing import CONTROL_WINDOW, WINDOWS_PER_ACTION_STEP
 from ..settings.checks import real_numbers
 from ..settings.drawn import OWN_FEET
 from ..settings.settings import BipedSettings, settings_of_bodies
@@ -391,7 +391,7 @@ class Biped(ExactState):
             self._person.move(self._person.offsets(step.of_person), step.walking, resting)
         elif self._learned is not None:
             windows = self._steps * self.windows_per_step + window  # since the episode began
-            moving = step.walking & (windows % WINDOWS_PER_STEP == 0)
+            moving = step.walking & (windows % WINDOWS_PER_ACTION_STEP == 0)
             observation = self._task.observe(self._simulation.arrays.bodies, len(PERSON_OBSERVATION))
             self._person.move(self._learned.offsets(observation, moving), moving, resting)
 
@@ -413,13 +413,13 @@ class Biped(ExactState):
         """End control window number `window` of the step and begin the next."""
         controls = self.subjects.rows
         options = self._springs.options
-        person_acts = self._learned is not None and (window + 1) % WINDOWS_PER_STEP == 0  # in steps of 40 ms
-        if step.window_start is None and not person_acts:
+        person_acts = self._learned is not None and (window + 1) % WINDOWS_PER_ACTION_STEP == 0
+        if step.window_start is None and not person_acts:  # nothing happens in between: one compiled call
             next_window(
                 controls, self._physics, self._forces, window, self._control, self._tables, options, step.walking
             )
             self._after_window(step)
-        else:  # report the window with the control that produced it
+        else:  # in between, a listener reads the numbers of the ended window, or the person moves amid a 40 ms step
             end_window(controls, self._physics, self._forces, window, step.walking)
             self._after_window(step)
             if person_acts:

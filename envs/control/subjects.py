@@ -194,13 +194,13 @@ class Subjects:
         self._next_draw[ids] = np.inf
         self._speeds_move = True
 
-    def advance(self, steps: NDArray, randoms: Sequence[np.random.Generator | None], running: NDArray) -> bool:
-        """Let a step pass for the `running` (N,) environments, which have done `steps` (N,) before; draw new target
-        speeds where that is due. Return True if any commanded speed changed."""
+    def advance(self, steps: NDArray, randoms: Sequence[np.random.Generator | None], walking: NDArray) -> bool:
+        """Let a step pass for the `walking` (N,) environments, which have done `steps` (N,) before; draw new target
+        speeds where that is due. Return False if no commanded speed can have changed."""
         settings = self._settings
         if settings.speed_interval is not None:
             time = steps * settings.step_seconds
-            for index in np.flatnonzero(running & (time >= self._next_draw)).tolist():
+            for index in np.flatnonzero(walking & (time >= self._next_draw)).tolist():
                 random = randoms[index]
                 if random is not None and settings.speed_range is not None:
                     self.target[index] = random.uniform(*settings.speed_range)
@@ -208,7 +208,7 @@ class Subjects:
                     self._speeds_move = True
         if not self._speeds_move:
             return False
-        self._speeds_move = _approach(settings.speed_rate * settings.step_seconds, running, self.rows["subject"])
+        self._speeds_move = _approach(settings.speed_rate * settings.step_seconds, walking, self.rows["subject"])
         self._locate(self._everyone)
         return True
 

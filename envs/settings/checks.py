@@ -79,7 +79,7 @@ def check_guide(follows_plan: bool, human: object, plan_file: object, cadence: s
 def check_names(given: Iterable[str], names: Sequence[str]) -> None:
     """Refuse a given name that is no setting, as Python refuses an unknown keyword argument; `names` are the settings.
 
-    The error names similar settings.
+    The error names similar ones, or all settings if none is similar.
     """
     for name in given:
         if name not in names:

@@ -262,6 +262,7 @@ class BipedSettings:
     """Weight of the knee's squared error in the term `pose` [0..20], where thigh and ankle weigh 3."""
 
     def __post_init__(self) -> None:
+        """Check all settings, and turn plain JSON values into objects before the checks that read these."""
         body_of(self)  # raises for an impossible one
         require_within("speed", self.speed, PLAN_SPEED_RANGE, "m/s")
         self._check_draws()

@@ -174,7 +174,8 @@ def _com_panels(recording: Recording, gait: Gait) -> list[dict[str, Any]]:
 def _spring_panels(recording: Recording) -> list[dict[str, Any]]:
     """Return the panels of K and theta_eq over each leg's phase, both legs on one pair of axes.
 
-    The mean over strides is the course of the policy's copy without feedback, the SD the departure by feedback.
+    The mean over strides is the part of a policy that its open-loop copy repeats in every stride; the SD is how far
+    feedback departs from it.
     """
     curves = schedule_curves(recording)
     group = "Stiffness and equilibrium over the leg's phase"
@@ -186,7 +187,7 @@ def _spring_panels(recording: Recording) -> list[dict[str, Any]]:
         for joint in SPRINGS:
             names = [f"{joint}_{side}_{column}" for side in SIDES]
             legs = [{"mean": shown_numbers(curves[n]), "sd": shown_numbers(curves[f"{n}_sd"])} for n in names]
-            left = curves[names[0]], curves[f"{names[0]}_sd"]
+            left = curves[names[0]], curves[f"{names[0]}_sd"]  # the page draws `legs` in its place
             title = f"{joint.capitalize()}, {words}"
             panels.append(_panel(group, title, unit, left, zero=unit == "N·m/rad", axis="leg", legs=legs))
     return panels

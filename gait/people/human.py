@@ -269,15 +269,16 @@ def foot_habits(people: str | Path = PEOPLE_FILE) -> FootHabits:
 
 
 def human_cop(stance_share: ArrayLike, people: str | Path = PEOPLE_FILE) -> NDArray:
-    """Return the centre of pressure over stance, forward of the flat foot's ankle, as a fraction of the foot's length.
+    """Return the CoP over stance, forward of the flat foot's ankle, as a fraction of the foot's length; shaped as
+    `stance_share`.
 
-    `stance_share` 0 is heel strike, 1 toe-off; outside, the value of the nearer end holds. ONE subject (56.7
-    kg, natural cadence; Winter 2009, appendix A), within 3 mm rms, the same at all speeds: shape and size, not a norm.
+    `stance_share` 0 is heel strike, 1 toe-off; outside, the value of the nearer end holds. One adult's (56.7 kg,
+    natural cadence; Winter 2009, appendix A), within 3 mm rms, the same at all speeds: it is no average of people.
     The ends of that foot were not measured: its length is taken as the travel of the centre of pressure, 0.258 m.
     """
-    fraction = np.clip(np.asarray(stance_share, float), 0.0, 1.0)
-    coefficients = np.array(harmonics(people)["cop"]["coefficients"])  # of the powers of the fraction, from 0
-    return fraction[..., None] ** np.arange(len(coefficients)) @ coefficients
+    share = np.clip(np.asarray(stance_share, float), 0.0, 1.0)
+    coefficients = np.array(harmonics(people)["cop"]["coefficients"])  # of the powers of the share, from 0
+    return share[..., None] ** np.arange(len(coefficients)) @ coefficients
 
 
 @cache

@@ -278,7 +278,7 @@ def gait_of_percents(table: Table, side: str, trust_units: bool) -> OwnGait:
 def one_condition(table: Table, condition: str | None) -> Table:
     """Return a table with the rows of one gait, percent 0 to 100 by 1 or by 2; `condition` picks it from several.
 
-    Raises `SpringfootError` for other percents, or if the condition is unknown or missing.
+    Raises `SpringfootError` for other percents, or if the condition is unknown, missing, or that of several gaits.
     """
     percent = table.numbers("percent")
     step = 2 if len(percent) > 1 and percent[1] == 2 else 1
@@ -307,6 +307,8 @@ def one_condition(table: Table, condition: str | None) -> Table:
             f"{table.name} holds the conditions {', '.join(names)}; condition must be one of them (on the command "
             f"line {table.name}:{names[0]}), got {condition!r}"
         )
+    if (count := names.count(condition)) > 1:
+        raise SpringfootError(f"{table.name} holds {count} gaits of the condition {condition}; it must name one")
     return replace(table, name=f"{table.name}:{condition}", rows=blocks[names.index(condition)])
 
 

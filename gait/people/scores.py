@@ -105,6 +105,7 @@ def phase_means(curve: NDArray, toe_off_percent: float) -> dict[str, float | Non
     """Return a curve's means in loading (0 to 10 %), mid_stance (10 to 45 %), push_off (45 % to toe-off) and swing.
 
     A percent belongs to the phase that it begins; percent 100 is percent 0 of the next stride and left out.
+    None for a phase without a percent.
     """
     percent = np.arange(100)
     bounds = (0, LOADING_END_PERCENT, PUSH_OFF_BEGIN_PERCENT, toe_off_percent, 100)

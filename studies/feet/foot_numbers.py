@@ -16,12 +16,12 @@ again."""
 def numbers_of_feet(gait: Gait, examined_side: str = "right") -> dict[str, float | None]:
     """Return the numbers of an undisturbed walk, by `FOOT_NUMBERS`; None for numbers without a stride.
 
-    The foot of `examined_side` is examined, the other one is sound. Where both feet are alike, "both", it is the right
-    one. Moments are peaks in extension of the sound side.
+    The foot of `examined_side` is examined, the other one is sound; "both", of feet that are alike, examines the right
+    one. `falls` is a share of the episodes. Moments are peaks in extension of the sound side.
     """
     metrics = gait.metrics
     tally = gait.tally
-    sides = ("right", "left") if examined_side == "left" else ("left", "right")
+    sides = ("right", "left") if examined_side == "left" else ("left", "right")  # sound, examined
     legs = leg_numbers(tally)
     sound, examined = (legs[side] for side in sides)
     sound_curves = tally.feet[SIDES.index(sides[0])]

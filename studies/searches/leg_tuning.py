@@ -101,12 +101,18 @@ class LegTuning(Study):
     UNIT: ClassVar[str] = " steps"
 
     def check(self) -> None:
-        """Refuse counts out of range."""
-        for count, least in (
-            *(("generations", 1), ("population", 2), ("refinements", 0)),
-            *(("threads", 1), ("seed", 0), ("ease", 0), ("pushed_from", 0)),
-        ):
-            require_count(count, getattr(self, count), least)
+        """Refuse numbers out of range, and refinements of a walk that pays for effort: they need misses of a target."""
+        least = {
+            "generations": 1,
+            "population": 2,
+            "refinements": 0,
+            "threads": 1,
+            "seed": 0,
+            "ease": 0,
+            "pushed_from": 0,
+        }
+        for count, bound in least.items():
+            require_count(count, getattr(self, count), bound)
         require_number("sigma", self.sigma, 0, above=True)
         require_number("foreign", self.foreign, 0)
         require_number("impact", self.impact, 0)

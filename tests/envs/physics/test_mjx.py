@@ -6,7 +6,7 @@ import pytest
 
 from benchmarks.walking import Physics, record_walk
 from springfoot.envs.physics.model import build_spec
-from springfoot.envs.physics.timing import WINDOWS_PER_STEP
+from springfoot.envs.physics.timing import WINDOWS_PER_ACTION_STEP
 from springfoot.gait.body.body import Body
 
 jax = pytest.importorskip("jax", reason="needs the extra mjx")
@@ -44,5 +44,5 @@ def test_mjx_walks_as_c_mujoco_does():
         contacts.add(int(data.ncon))
         for mine, theirs in ((data.qpos, here.qpos), (data.qvel, here.qvel)):
             apart = max(apart, float(np.abs(mine - np.asarray(theirs)).max()))
-    assert len(contacts) > 1 and WINDOWS_PER_STEP * physics.substeps * (len(walk.actions) - first) >= STEPS
+    assert len(contacts) > 1 and WINDOWS_PER_ACTION_STEP * physics.substeps * (len(walk.actions) - first) >= STEPS
     assert apart < 1e-6

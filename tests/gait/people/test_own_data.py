@@ -269,6 +269,10 @@ def test_of_several_conditions_one_is_named(tmp_path):
             SpringfootError, match=r"mean\.csv holds the conditions slow, fast; condition must .* mean\.csv:slow\), got"
         ):
             read_gait(path, condition=condition)
+    twice = gait_csv(tmp_path / "twice.csv", repeat=("slow", "fast", "slow"))
+    assert read_gait(twice, condition="fast").name == "twice.csv:fast"
+    with pytest.raises(SpringfootError, match=r"^twice\.csv holds 2 gaits of the condition slow; it must name one$"):
+        read_gait(twice, condition="slow")
 
 
 def test_json_gives_the_same_gait_to_the_bit(tmp_path):
