@@ -52,7 +52,7 @@ WORLD: tuple[dict[str, Any], ...] = (
 QUASI_SPEED = 1.35
 """Commanded speed [m/s] at which people's quasi-stiffness, which is not tuned, walks about 1.2 m/s."""
 COMPARABLE = (
-    *("speed", "cadence", "guide", "people_file", "plan_file", "human"),
+    *("speed", "step_time_ratio", "cadence", "guide", "people_file", "plan_file", "human"),
     *("reward_weights", "forward_force_weight", "knee_weight"),
 )
 """Settings that rows must share for a comparison of their returns."""

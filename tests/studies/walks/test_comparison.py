@@ -147,7 +147,7 @@ def test_table_and_verdict_say_what_the_policy_is_ahead_of_and_what_not():
 def test_returns_of_other_rewards_or_targets_do_not_compare():
     themes = {field.name: field.metadata.get("theme") for field in dataclasses.fields(BipedSettings)}
     judged = {name for name in themes if themes[name] in (themes["guide"], themes["reward_weights"])}
-    assert judged | {"speed"} == set(comparison.COMPARABLE) and len(judged) > 5
+    assert judged | {"speed", "step_time_ratio"} == set(comparison.COMPARABLE) and len(judged) > 5
     for name in comparison.COMPARABLE:
         ours, other = row_of("ours", np.arange(20.0)), row_of("other", np.zeros(20))
         assert other.difference(ours) is not None
