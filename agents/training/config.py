@@ -8,7 +8,7 @@ from numbers import Integral
 from typing import Any, Literal, get_args
 
 from springfoot.envs.settings.checks import MOST_ENVIRONMENTS, refusing_unknown
-from springfoot.envs.settings.settings import DEFAULT_WEIGHTS, BipedSettings, settings_from, settings_to_json
+from springfoot.envs.settings.settings import BipedSettings, settings_from, settings_to_json
 from springfoot.errors import (
     MOST_COUNT,
     MOST_THREADS,
@@ -67,11 +67,6 @@ class TrainingConfig:
     critic_steps: int = 0
     """Environment steps at the start in which the critic alone learns, so that a good policy to begin from is not led
     astray by an untrained critic."""
-    early_factors: dict[str, float] = field(default_factory=dict)
-    """Factors on the reward's weights at the start of the training, by the name of the term [-]: a walk is learned
-    sooner at low prices. Evaluations have the whole weights."""
-    early_share: float = 0.0
-    """Fraction of the timesteps at the start in which `early_factors` hold [0..1]; 0 with `begin_from`."""
     log_std: float = -0.9
     """Logarithm of the standard deviation of the actions at the start."""
     hidden: tuple[int, ...] = (64, 64)
@@ -99,9 +94,8 @@ class TrainingConfig:
         for name in ("learning_rate", "clip_range"):
             require_number(name, getattr(self, name), 0, _LARGEST, above=True)
         require_number("gamma", self.gamma, 0, 1, above=True)
-        for name in ("gae_lambda", "learning_rate_end", "early_share"):
+        for name in ("gae_lambda", "learning_rate_end"):
             require_number(name, getattr(self, name), 0, 1)
-        _check_factors(self.early_factors)
         require_number("log_std", self.log_std, -5, 2)
         if not isinstance(self.mirrored, bool):
             raise SpringfootError(f"mirrored must be True or False, got {quoted(self.mirrored)}")
@@ -116,16 +110,6 @@ class TrainingConfig:
             raise SpringfootError(
                 f"hidden must have at most {MOST_WEIGHTS:,} weights between its layers, has {between:,}"
             )
-
-
-def _check_factors(factors: Any) -> None:
-    """Raise `SpringfootError` unless early factors are numbers from 0 on, by names of reward terms."""
-    if not isinstance(factors, dict):
-        raise SpringfootError(f"early_factors must map names of reward terms to numbers, got {quoted(factors)}")
-    for name, factor in factors.items():
-        if name not in DEFAULT_WEIGHTS:
-            raise SpringfootError(f"early_factors has no term {quoted(name)}; valid: {', '.join(DEFAULT_WEIGHTS)}")
-        require_number(f"early_factors[{name!r}]", factor, 0.0, _LARGEST)
 
 
 PREDICTED = replace(
@@ -315,8 +299,6 @@ def require_of_rllib(config: TrainingConfig) -> None:
         raise SpringfootError("--engine rllib trains no mirrored network: give --mirrored False, or another engine")
     if config.device != "cpu":
         raise SpringfootError(f"--engine rllib learns on the CPU; drop --device {config.device}, or --engine")
-    if config.early_share:
-        raise SpringfootError("--engine rllib charges whole prices from the start: give --early-share 0")
     if config.critic_steps:
         raise SpringfootError("--engine rllib trains actor and critic together; drop --critic-steps, or --engine")
 

@@ -202,8 +202,6 @@ class Session(BaseCallback):
         self._ended = []
         self._rollout_complete = False
         self._capture()
-        is_early = self._trained < self._config.early_share * self._config.timesteps
-        self._environments.env.biped.weigh(self._config.early_factors if is_early else {})
         evaluations = self._record["evaluations"]
         due = not evaluations or self._trained - evaluations[-1]["timesteps"] >= self._config.eval_interval
         if due and not self._stopping.asked:

@@ -44,8 +44,6 @@ def train(
     out = require_new(out)
     begin = None if begin_from is None else _beginning(begin_from)
     with owned(out):
-        if begin is not None:
-            config = dataclasses.replace(config, early_share=0.0)
         remove_temporary(require_new(out))  # checked again, now that no other process can write into it
         return Session(config, out, {"sessions": [], "evaluations": []}, callbacks=callbacks, begin=begin).learn()
 
@@ -116,8 +114,7 @@ def resume(
             raise SpringfootError(f"{out} has done its {done:,} timesteps; timesteps must say how many more to train")
         if checkpoint:
             _require_same_shape(out, header["config"], config_to_json(config))
-        early = config.early_share * config.timesteps / total  # the same steps of the longer training
-        config = dataclasses.replace(config, timesteps=total, early_share=early, device=device or config.device)
+        config = dataclasses.replace(config, timesteps=total, device=device or config.device)
         return Session(config, out, header["record"], checkpoint, threads, callbacks).learn()
 
 

@@ -312,10 +312,6 @@ class Biped(ExactState):
         """Return the present observation (N, D), float32."""
         return self._noise.on(self._task.observe(self._simulation.arrays.bodies))
 
-    def weigh(self, factors: Mapping[str, float]) -> None:
-        """Multiply the reward's weights by `factors` in all steps to come, by the name of the term; 1 for others."""
-        self._task.weigh(factors)
-
     def step(self, actions: NDArray, active: NDArray | None = None) -> StepResult:
         """Apply actions (N, A), as `action_names`, for one step.
 

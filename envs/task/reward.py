@@ -5,7 +5,7 @@ same bits as N batches of one. Axes: N bodies; W control windows of a step; side
 and toe tip; a `PhaseTable` (R, SAMPLES, 2, C) has R rows, phases, value and rise to the next phase, and C curves.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from math import exp
 
 import numpy as np
@@ -338,11 +338,10 @@ class Task:
         self.names = tuple(entry.name for entry in entries)
         self.low = LOW[: len(entries)]
         self.high = HIGH[: len(entries)]
-        of_settings = DEFAULT_WEIGHTS | settings.reward_weights
-        self.weights = {name: of_settings[name] for name in TERMS}
+        self.weights = DEFAULT_WEIGHTS | settings.reward_weights
         self.rows = np.zeros(len(subjects.bodies), TASK_ROW)
         """(N,) of `TASK_ROW`: all numbers that the task remembers of each environment."""
-        weights = list(self.weights.values())
+        weights = [self.weights[name] for name in TERMS]
         seconds = settings.step_seconds
         share = seconds / ACTION_STEP
         limit = settings.max_episode_steps
@@ -357,10 +356,6 @@ class Task:
         self._feet = feet
         self._knee_weight = settings.knee_weight
         self.fit(range(len(self.rows)))
-
-    def weigh(self, factors: Mapping[str, float]) -> None:
-        """Pay and charge the settings' weights times `factors` from now on, by the name of the term; others whole."""
-        self.options["weights"] = [weight * factors.get(name, 1.0) for name, weight in self.weights.items()]
 
     def fit(self, ids: Iterable[int]) -> None:
         """Compute scales, units and entries of the feet anew for the present bodies and feet of environments `ids`."""
