@@ -172,7 +172,7 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
     follows. `gym.make(..., max_episode_steps=100)` ends episodes earlier, never later.
 
     ## Info
-    NumPy numbers, the same keys from `reset` and `step`. Of each action's name: `stiffness/` [N m/rad], `torque/`
+    Numbers of Python, the same keys from `reset` and `step`. Of each action's name: `stiffness/` [N m/rad], `torque/`
     [N m] and `equilibrium/` [rad] at the step's end; `work/stiffness/` and `work/equilibrium/` [J], the work done in
     the step by changing stiffness and by moving the equilibrium; `controlled/`, 1 where the action counts and 0
     where it is read as 0. Of each reward term `reward/`. `phase/left`, `phase/right` [0, 1), `time` [s], `speed` [m/s].
@@ -310,7 +310,7 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
         if self.render_mode == "human":
             self.render()
         values = report_start(self.biped.measurement, self.biped.leg_phase, self.biped.controlled)
-        return self.biped.observe()[0], _info(values[0], termination=np.int64(0))  # 0: none
+        return self.biped.observe()[0], _info(values[0], termination=0)
 
     def step(self, action: NDArray) -> tuple[NDArray, float, bool, bool, dict[str, Any]]:
         """Hold what `action` (A,) sets, by default stiffness of ankles and toes, during a step, by default 20 ms."""
@@ -340,11 +340,13 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
         self._close_camera()
 
 
-def _info(values: NDArray, termination: np.integer) -> dict[str, Any]:
-    """Return the info of one environment: NumPy numbers by name, from `StepResult.values` (len(INFO),) and the code of
-    the termination."""
+def _info(values: NDArray, termination: int | np.integer) -> dict[str, Any]:
+    """Return the info of one environment by name, from `StepResult.values` (len(INFO),) and the code of the
+    termination.
+
+    The numbers are Python's, as wrappers copy every info, and NumPy's take a third longer to copy.
+    """
     info = dict(_NO_INFO)  # of its full size: an empty one would grow name by name
-    # In every step: `zip` takes half as long again if it is strict, and so do the values without `flat`.
-    info.update(zip(INFO, values.flat, strict=False))
-    info["termination"] = termination
+    info.update(zip(INFO, values.tolist(), strict=False))  # in every step: strict would take half as long again
+    info["termination"] = int(termination)
     return info
