@@ -22,7 +22,7 @@ COMMANDS = [
     ("`springfoot train`", "train a policy; `train.py` is the same"),
     ("`springfoot evaluate`", "evaluate policies; `evaluate.py` is the same"),
     ("`springfoot live`", "steer a walk in a browser"),
-    ("`springfoot feet`", "compare springs or feet on a learned person"),
+    ("`springfoot feet`", "compare springs or feet on learned persons"),
     ("`springfoot person`", "tell one person's quasi-stiffness from their motion files"),
     ("`springfoot score`", "hold any gait's motion files against people"),
     ("`springfoot export`", "write a policy as an ONNX file"),

@@ -68,7 +68,7 @@ class LegConstants:
     neutral_deg: tuple[float, float]
     """Constant ankle and toe angle of `equilibrium="neutral"` [deg]."""
     toe_flat_deg: float
-    """Planned equilibrium angle of the toe from foot flat to toe-off [deg]; a negative one presses the toe down."""
+    """Planned rest angle of the toe from foot flat to toe-off [deg]; a negative one presses the toe down."""
     ankle_schedule: tuple[float, float, float, float, float]
     """Fixed ankle stiffness in loading, early stance, late stance, push-off, swing [N m/rad]."""
     toe_schedule: float

@@ -32,7 +32,7 @@ MOST_DRAWS = 1000
 
 @kernel
 def _approach(most, running, subjects):
-    """Change the commanded speeds of environments `running` (N,) by at most `most` [m/s] towards their target speeds.
+    """Change the commanded speeds of environments `running` (N,) by at most `most` [m/s], towards those drawn last.
 
     `subjects` is (N,) of `SUBJECT`. Returns True if any speed has not reached its target, also of an environment that
     does not run now: it changes once that runs again.
@@ -195,8 +195,8 @@ class Subjects:
         self._speeds_move = True
 
     def advance(self, steps: NDArray, randoms: Sequence[np.random.Generator | None], walking: NDArray) -> bool:
-        """Let a step pass for the `walking` (N,) environments, which have done `steps` (N,) before; draw new target
-        speeds where that is due. Return False if no commanded speed can have changed."""
+        """Let a step pass for the `walking` (N,) environments, which have done `steps` (N,) before; draw new speeds
+        to approach where that is due. Return False if no commanded speed can have changed."""
         settings = self._settings
         if settings.speed_interval is not None:
             time = steps * settings.step_seconds

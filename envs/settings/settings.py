@@ -178,7 +178,7 @@ class BipedSettings:
     plan_file: str | None = field(default=None, metadata=_REFERENCE)
     """With guide `plan`: file of the plan's style and leg constants (`springfoot study predict`), not the package's."""
     equilibrium: Equilibrium = field(default="planned", metadata=_SPRINGS)
-    """Equilibrium angle of ankle and toe: people's ankle angle with the moment of `feedforward` fed forward (planned),
+    """Rest angle of ankle and toe: the target's ankle angle with the moment of `feedforward` fed forward (planned),
     that angle alone, constant (neutral), or constant in each phase of `schedule` (phase)."""
     feedforward: Feedforward = field(default="people", metadata=_SPRINGS)
     """Joint moments that are fed forward to hips, knees and ankles: those measured on people at this speed, or those
@@ -281,9 +281,7 @@ class BipedSettings:
         if self.schedule is not None and not isinstance(self.schedule, StiffnessSchedule):
             object.__setattr__(self, "schedule", StiffnessSchedule.from_json(self.schedule))
         if self.schedule is None and self.equilibrium == "phase":
-            raise SpringfootError(
-                "equilibrium 'phase' needs a schedule, which brings its own equilibrium angles, got None"
-            )
+            raise SpringfootError("equilibrium 'phase' needs a schedule, which brings its own rest angles, got None")
         if self.human is not None and not isinstance(self.human, OwnGait):
             object.__setattr__(self, "human", OwnGait.from_json(self.human))
         require_number("step_time_ratio", self.step_time_ratio, *STEP_TIME_RATIO_RANGE)

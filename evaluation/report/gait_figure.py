@@ -243,7 +243,7 @@ def _write_header(figure: Figure, recording: Recording, gait: Gait, human: Human
             Line2D([], [], color=PEOPLE, lw=1.3),
         ),
         "plan": Line2D([], [], color=PLAN, lw=1.3, ls=(0, (4, 2))),
-        "equilibrium angle": Line2D([], [], color=MODEL, lw=1.2, ls=(0, (1, 1.2))),
+        "rest angle": Line2D([], [], color=MODEL, lw=1.2, ls=(0, (1, 1.2))),
         "toe-off": Line2D([], [], color="#777777", lw=0.8, ls=(0, (2, 2))),
     }
     figure.legend(

@@ -26,7 +26,7 @@ thesis says 0."""
 STIFFNESS_RANGE = (0.0, 1e5)
 """Accepted stiffnesses of a schedule [N m/rad]; chosen."""
 ANGLE_RANGE = (-np.pi, np.pi)
-"""Accepted equilibrium angles of a schedule [rad]."""
+"""Accepted rest angles of a schedule [rad]."""
 HEEL_OFF_RISE = 0.05
 """Part of the toe's rise, from its lowest angle in stance to its largest, at which the heel is off [-]; chosen."""
 

@@ -41,7 +41,7 @@ MOST_FEET = 8
 """Feet that the colours of a report tell apart."""
 SIDES_OF = {"left": ("left_foot",), "right": ("right_foot",), "both": ("left_foot", "right_foot")}
 """Side -> settings of its feet."""
-OTHER_SPEED = 0.1
+OTHER_SPEED = 0.15
 """How much slower the second walk is asked for, as a share: walks with hindrances are slower than asked for."""
 PRICE_NAMES = dict(zip(TWO_PRICES, ("fibre work", "effort"), strict=True))
 """Column of a price -> its name."""
@@ -124,7 +124,7 @@ class FootChoice(WalkingStudy):
     """Rest angle of the orthoses, dorsiflexion positive [deg]."""
     foot: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="FOOT")] = ()
     """A foot, as of --right-foot: a kind, JSON, or a file; once for each foot."""
-    persons: Annotated[tuple[str, ...], tyro.conf.arg(metavar="PERSON ...")] = ("learned",)
+    persons: Annotated[tuple[str, ...], tyro.conf.arg(metavar="PERSON ...")] = ("learned", "learned-2", "learned-3")
     """Persons that adapt to the feet: run folders, files, or those of the package, such as `learned`."""
     push_newton: float = 100.0
     """Size of the pushes in the pushed walks [N]."""
@@ -133,7 +133,7 @@ class FootChoice(WalkingStudy):
     seconds: float = 12.0
     """Length of each episode."""
 
-    QUICK: ClassVar[Mapping[str, Any]] = {"episodes": 1, "seconds": 6.0}
+    QUICK: ClassVar[Mapping[str, Any]] = {"persons": ("learned",), "episodes": 1, "seconds": 6.0}
     REPEATABLE: ClassVar[Collection[str]] = frozenset({"--foot"})
 
     def check(self) -> None:

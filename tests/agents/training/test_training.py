@@ -148,6 +148,12 @@ def test_state_is_all_there_is_to_a_learner(learner):
     assert all(np.array_equal(state[name], restored[name]) for name in state)
 
 
+def test_the_learning_rate_falls_on_a_line_to_a_share_of_its_beginning(learner):
+    rates = [learner.ppo.lr_schedule(left) for left in (1.0, 0.5, 0.0)]
+    begin, end = SHORT.learning_rate, SHORT.learning_rate * SHORT.learning_rate_end
+    assert rates == [pytest.approx(rate, rel=1e-12) for rate in (begin, (begin + end) / 2, end)]
+
+
 def test_state_of_another_shape_is_refused(learner):
     state = learner.state()
     for name, words in (("observation.mean", "observation.mean"), ("network.log_std", "log_std")):

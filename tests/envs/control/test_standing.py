@@ -64,6 +64,13 @@ def test_posture_has_flat_feet_and_the_com_at_its_place(body, knee):
     np.testing.assert_allclose(np.ptp(m.contact[0, ..., 1]), 0.0, atol=1e-9)
 
 
+@pytest.mark.parametrize("slope_deg", [-5.0, 5.0])
+def test_who_begins_to_stand_on_a_slope_has_both_feet_flat_on_it(slope_deg):
+    biped = standing(slope_deg=slope_deg)
+    heights = biped.measurement.contact[..., 1]  # of heel, ball and toe tip above the ground below them
+    np.testing.assert_allclose(heights, heights.min(), atol=5e-4)
+
+
 def test_a_standing_body_bears_its_weight_under_its_com_and_moves_little():
     biped = standing(mass=80.0, height=1.8)
     actions = np.random.default_rng(0).uniform(-1, 1, (2, 4))

@@ -400,6 +400,7 @@ def test_strides_in_which_a_plate_loses_force_are_left_out_and_told(side, damage
     cut = read_person(damaged(files, side[0], strides[1:2], damage))
     leg = cut.legs[side]
     assert leg.partly[1] and not leg.weighed[1] and leg.weighed[2:].any()
+    assert leg.times[1, 1] == pytest.approx(strides[1, 1], abs=0.03)  # toe-off by the motion, not by what is left
     assert cut.mass == pytest.approx(whole.mass, rel=0.01)
     assert cut.toe_off(side) == pytest.approx(whole.toe_off(side), abs=0.01)
     # In controlled plantarflexion the slope is near 0: 2 N m/rad are its noise.
@@ -442,8 +443,11 @@ def test_the_mass_of_one_plate_is_told(tmp_path):
 
 
 def test_the_mass_that_was_given_and_the_one_the_forces_bear(tmp_path):
-    measured = read_person(opensim("Rajagopal", tmp_path), mass=90.0)
+    files = opensim("Rajagopal", tmp_path)
+    measured = read_person(files, mass=90.0)
     assert measured.mass == 90.0 and any("The forces bear 7" in note and "not 90" in note for note in measured.notes)
+    # Feet are whole on their plates against the weight that both bear, whatever the mass given.
+    assert all(leg.weighed.all() for leg in read_person(files, mass=140.0).legs.values())
     alone = read_person([tmp_path / "ik.mot", tmp_path / "id.sto"])
     assert alone.mass is None and any("--mass" in note for note in alone.notes)
     assert not any("too little for N m" in note for note in alone.notes)
