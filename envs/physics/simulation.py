@@ -250,11 +250,21 @@ class Simulation:
 
         Simulations `ids` get torques and contact forces of 0, and their muscles' sums begin anew.
         """
-        self.arrays.sensors[ids] = 0.0
-        measure_bodies(*self.arrays)
+        self._measure_without_forces(ids)
         self.now.torque[ids] = 0.0
         forget(self.arrays.bodies["muscles"], ids, self.now.angle, self.now.velocity)
         return self.now
+
+    def contact_height(self, ids: NDArray | slice) -> NDArray:
+        """Return the height (K, side, contact) of the contacts of simulations `ids` (K,) above the ground [m], in the
+        present posture."""
+        self._measure_without_forces(ids)
+        return self.now.contact[ids, ..., 1]
+
+    def _measure_without_forces(self, ids: NDArray | slice) -> None:
+        """Measure all simulations, those of `ids` (K,) without contact forces."""
+        self.arrays.sensors[ids] = 0.0
+        measure_bodies(*self.arrays)
 
     def data(self, index: int) -> MjData:
         """Return a copy of the state of simulation `index` after `mj_forward`, to render or to inspect."""

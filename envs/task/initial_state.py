@@ -11,7 +11,7 @@ from ..control.constants import LegConstants
 from ..control.phase_table import GRID, PhaseTable, leg_phases
 from ..control.reference_walk import ReferenceWalk
 from ..control.subjects import Subjects
-from ..physics.model import ANKLE, HIP
+from ..physics.model import ANKLE, HIP, JOINTS
 from ..physics.simulation import Simulation
 
 START_PHASES = (0.08, 0.38)
@@ -44,8 +44,8 @@ def walking_posture(
     """
     phase = leg_phases(left_phase)
     curves = table.at(phase, subjects.place[ids])  # (K, side, 9) as `_start_curves`; the last, pitch
-    angle, velocity = np.split(curves[..., :-1], 2, axis=-1)
-    velocity = velocity / subjects.scale["time"][ids, None, None]
+    angle = curves[..., : len(JOINTS)]
+    velocity = curves[..., len(JOINTS) : -1] / subjects.scale["time"][ids, None, None]
     feet = subjects.rows["feet"]
     hangs = (feet["rests"][ids] > 0) & (phase > _SWINGS_FROM)[..., None]
     angle[..., ANKLE:] = np.where(hangs, feet["rest"][ids], angle[..., ANKLE:])
@@ -85,7 +85,7 @@ def place(
     rate[:, 0] = speed
     simulation.reset(ids, base, rate, angle, velocity)
     # With the hips at height 0 the height of the lowest point says how far to lift the body.
-    lowest = simulation.measure(ids).contact[ids, ..., 1].min(axis=(1, 2))  # over sides and contacts
+    lowest = simulation.contact_height(ids).min(axis=(1, 2))  # over sides and contacts
     simulation.lift(ids, -lowest - START_DEPTH * simulation.body.length_scale * subjects.scale["length"][ids])
 
 
