@@ -55,6 +55,8 @@ STATE_NAMES = {
     "toe-off": "swing",
 }
 """Event at which a finite state begins -> its name."""
+TAUGHT = "learned-2"
+"""Learned person that `--train` begins from; chosen: it was trained by one command."""
 SPRING_EVENTS = {
     "ankle": ("heel strike", "foot flat", "maximum dorsiflexion of the ankle", "toe-off"),
     "toe": ("heel strike", "heel-off", "maximum dorsiflexion of the toe", "toe-off"),
@@ -82,7 +84,8 @@ class Person(MotionFiles):
     """
 
     train: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER")] = None
-    """Print the command that trains a policy towards this person, into this folder."""
+    """Print the commands that train towards this person: a policy, into this folder, and a person that learns the
+    curves, into FOLDER-person."""
 
     def ask(self, progress: OnProgress) -> Answer:
         """Read the files, and put the person beside people."""
@@ -370,12 +373,17 @@ class _Sheet:
         )
 
     def _train_words(self) -> str:
-        """Return the command that trains towards this person."""
+        """Return the commands that train towards this person: a policy, and a person."""
         place = Path("curves.csv") if self._flags.out is None else self._flags.out / "curves.csv"
         where = " in the folder of these results" if self._flags.out is None else ""
         body = f"--mass {self._body.mass:.4g} --height {self._flags.height:g} --speed {self._speed:.3g}"
-        command = f"springfoot train --human {place} {body} --out {self._flags.train}"
-        return f"To train a policy towards this person{where}: `{command}`"
+        out = self._flags.train
+        policy = f"springfoot train --human {place} {body} --out {out}"
+        person = f"springfoot train --preset person --begin-from {TAUGHT} --human {place} --out {out}-person"
+        return (
+            f"To train a policy towards this person{where}: `{policy}`. To teach these curves to a learned person, "
+            f"whose body, feet and speed are drawn: `{person}`"
+        )
 
 
 def _events(gait: HumanGait, joint: str) -> dict[float, str]:

@@ -139,6 +139,7 @@ def test_every_file_is_written_and_read_again(mine, tmp_path, capsys):
     assert {path.name for path in out.iterdir()} == {*FILES, *PICTURES}
     for words in (
         "springfoot train --human",
+        f"springfoot train --preset person --begin-from learned-2 --human {out / 'curves.csv'} --out runs/me-person",
         "no property of a spring",
         "Without intervals",
         "Mass: 71.0 kg, as given",
