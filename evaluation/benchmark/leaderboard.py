@@ -41,12 +41,17 @@ def judged_rows(folder: Path) -> list[JudgedRow]:
     """Return the judged submissions anywhere below a folder, the highest public return first; those of equal return by
     name.
 
-    Raises `SpringfootError` for a bad submission, and for a judgement that is damaged, of another policy or task, or
-    with impossible numbers. A judgement is trusted: who keeps the folder makes it, by `springfoot judge`.
+    Raises `SpringfootError` for a bad submission, for two with the same returns on a task, and for a judgement that is
+    damaged, of another policy or task, or with impossible numbers. A judgement is trusted: who keeps the folder makes
+    it, by `springfoot judge`.
     """
     rows = []
+    folders: dict[tuple[str, bytes], Path] = {}  # of task and returns
     for path in sorted(folder.rglob(JUDGED)):
         submission = read_submission(path.parent)
+        other = folders.setdefault((submission.task, submission.walks.returns.tobytes()), path.parent)
+        if other != path.parent:
+            raise SpringfootError(f"{path.parent} returns the same in every episode as {other}: keep one of them")
         judged = read_object(path, "judgement")
         if (judged.get("policy_digest"), judged.get("task")) != (submission.digest, submission.task):
             raise SpringfootError(f"{path} judges another policy or task than {path.parent} submits")

@@ -270,12 +270,17 @@ def a_judgement(submission):
     return {"task": submission.task, "policy_digest": submission.digest, **numbers}
 
 
+def entered(submission, folder, *, first_return, mean=1.0):
+    """Copy a submission into a new folder under the folder's name, judged, with another return in its first episode."""
+    values = read_object(copied(submission, folder) / benchmark.SUBMISSION, "submission")
+    values |= {"name": folder.name, "returns": [first_return, *values["returns"][1:]]}
+    (folder / benchmark.SUBMISSION).write_bytes(object_with_digest(values))
+    (folder / benchmark.JUDGED).write_bytes(object_with_digest(a_judgement(submission) | {"return_mean": mean}))
+
+
 def test_a_table_has_eight_rows_and_says_how_many_more_there_are(submitted, tmp_path):
-    for name in "abcdefghij":
-        folder = copied(submitted[1], tmp_path / name)
-        values = read_object(folder / benchmark.SUBMISSION, "submission") | {"name": name}
-        (folder / benchmark.SUBMISSION).write_bytes(object_with_digest(values))
-        (folder / benchmark.JUDGED).write_bytes(object_with_digest(a_judgement(submitted[1])))
+    for place, name in enumerate("abcdefghij"):
+        entered(submitted[1], tmp_path / name, first_return=float(place))
     board = leaderboard(tmp_path)
     assert "\n| h |" in board
     assert "\n| i |" not in board
@@ -284,12 +289,18 @@ def test_a_table_has_eight_rows_and_says_how_many_more_there_are(submitted, tmp_
 
 def test_a_table_is_in_the_order_of_returns(submitted, tmp_path):
     for name, mean in (("low", 1.0), ("high", 3.0), ("between", 2.0)):
-        folder = copied(submitted[1], tmp_path / name)
-        values = read_object(folder / benchmark.SUBMISSION, "submission") | {"name": name}
-        (folder / benchmark.SUBMISSION).write_bytes(object_with_digest(values))
-        (folder / benchmark.JUDGED).write_bytes(object_with_digest(a_judgement(submitted[1]) | {"return_mean": mean}))
+        entered(submitted[1], tmp_path / name, first_return=mean, mean=mean)
     rows = [line for line in leaderboard(tmp_path).splitlines() if line.startswith("| ")][2:]
     assert [row.split(" | ")[0] for row in rows] == ["| high", "| between", "| low"]
+
+
+def test_an_entry_that_returns_as_another_does_is_refused(submitted, tmp_path):
+    for name in ("copy", "first"):
+        entered(submitted[1], tmp_path / name, first_return=1.0)
+    with pytest.raises(SpringfootError) as caught:
+        leaderboard(tmp_path)
+    told = f"{tmp_path / 'first'} returns the same in every episode as {tmp_path / 'copy'}: keep one of them"
+    assert str(caught.value) == told
 
 
 def test_judge_refuses_before_it_walks(submitted, tmp_path, capsys):
