@@ -1,1 +1,1 @@
-"""What a step costs beside its physics, and training beside its steps: `make bench`."""
+"""Measure the cost of a step beside its physics, and of training beside its steps: `make bench`."""

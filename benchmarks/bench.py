@@ -1,4 +1,4 @@
-"""What a step costs beside its physics, what batching gains, and how much faster training is than the study's.
+"""Measure the cost of a step beside its physics, the gain of batches, and the speed of training beside the study's.
 
     make bench
 
@@ -152,7 +152,7 @@ def _best(figures: dict[str, Figures], kind: str) -> float:
 
 
 def run(flags: Flags) -> None:
-    """Bench, print and write."""
+    """Measure, print and write."""
     about = machine()
     begin = perf_counter()
     versions = ", ".join(f"{name} {number}" for name, number in about["versions"].items())

@@ -44,7 +44,7 @@ LEAST_FALL = 0.1
 
 @dataclass(frozen=True, kw_only=True)
 class Cheating:
-    """Train with and without a charge for the fibres' work, and hold what falls in the reading against the truth."""
+    """Train with and without a charge for the fibres' work, and hold the reading's fall against the truth's."""
 
     seeds: tuple[int, ...] = (0, 1, 2)
     """Seeds of the trainings."""
@@ -115,7 +115,7 @@ def finely_used(biped: Biped, torque: NDArray, angle: NDArray, windows: int) -> 
 
 @dataclass(frozen=True, kw_only=True)
 class Prices:
-    """What the fibres of a learner's walks cost over body weight and way, means over episodes."""
+    """Costs of the fibres in a learner's walks over body weight and way, means over episodes."""
 
     reading: float
     """The reward's term, over the commanded way [-]."""

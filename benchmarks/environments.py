@@ -38,7 +38,7 @@ def adapter(walk: Walk, num: int, threads: int) -> Case:
 
 
 def single(walk: Walk) -> Case:
-    """One environment by plain `gym.make`."""
+    """Return one environment by plain `gym.make`."""
     return _single_case("gym.make, one", gym.make(OURS), walk.actions[:, 0], STEP)
 
 
@@ -79,7 +79,7 @@ def start_over_others(repeats: int) -> float | None:
 
 
 def walker_async(num: int) -> gym.vector.AsyncVectorEnv | None:
-    """Gymnasium's walker, each in a process of its own; before any thread pool, as `subprocesses`.
+    """Return Gymnasium's walkers, each in a process of its own; before any thread pool, as `subprocesses`.
 
     None where imageio is missing, without which Gymnasium's MuJoCo environments do not import.
     """
@@ -87,7 +87,7 @@ def walker_async(num: int) -> gym.vector.AsyncVectorEnv | None:
 
 
 def subjects(asynchronous: gym.vector.AsyncVectorEnv | None, num: int, threads: int, steps: int) -> list[Case]:
-    """Gymnasium's walker under random actions: single, one after the other, in processes, and in EnvPool if here."""
+    """Return Gymnasium's walker under random actions: single, in turn, in processes, and in EnvPool if here."""
     if asynchronous is None:
         print(f"{OTHERS} is left out: it needs imageio (pip install imageio)")
         return []

@@ -34,7 +34,7 @@ WARM_UP = 0.3
 
 @dataclass(kw_only=True)
 class Found:
-    """What was seen."""
+    """Numbers seen in the steps."""
 
     steps: int = 0
     settings: int = 0
@@ -114,7 +114,7 @@ def drawn_settings(random: np.random.Generator) -> dict[str, Any]:
 
 
 def walk(settings: dict[str, Any], seed: int, steps: int, found: Found) -> None:
-    """Take so many steps in each of `ENVIRONMENTS` and add what was seen; `SpringfootError` for refused settings."""
+    """Take so many steps in each of `ENVIRONMENTS` and add the numbers seen; `SpringfootError` for refused settings."""
     random = np.random.default_rng(seed)
     envs = SegmentedFootBipedVector(ENVIRONMENTS, **settings)
     space = envs.single_observation_space
@@ -141,7 +141,7 @@ def walk(settings: dict[str, Any], seed: int, steps: int, found: Found) -> None:
 
 
 def resident() -> float:
-    """Memory of this process that is in use now, without what is freed and kept for later [MB]."""
+    """Return the memory of this process in use now, without memory freed and kept for later [MB]."""
     gc.collect()
     with suppress(OSError, AttributeError):  # another system's library
         ctypes.CDLL("libc.so.6").malloc_trim(0)
@@ -193,7 +193,7 @@ class Flags:
 
 
 def run(flags: Flags) -> int:
-    """Take the steps, print what was seen; 1 if a number was not finite or the memory grew by 2 % or more."""
+    """Take the steps, print the numbers seen; 1 if a number was not finite or the memory grew by 2 % or more."""
     require_count("steps", flags.steps)
     require_count("seed", flags.seed, 0)
     require_count("settings", flags.settings, 0)

@@ -59,7 +59,7 @@ class Reader:
 
 
 def readers(folder: Path) -> dict[str, Reader]:
-    """Every reader by name; what it takes to make files of theirs stands in `folder`."""
+    """Return every reader by name; `folder` holds the parts of their files."""
     walk = record(*policy_and_settings("schedule", {"episode_seconds": 4.0}), name="schedule", episodes=1)
     recording = folder / "strides.npz"
     walk.save(recording)

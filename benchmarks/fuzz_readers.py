@@ -38,7 +38,7 @@ _TOKENS = [b"nan", b"inf", b"-1", b"0", b"1e308", b"-1e308", b"1e-320", b"9" * 4
 
 @dataclass(kw_only=True)
 class Found:
-    """What came of one reader."""
+    """Outcome of one reader."""
 
     read: int = 0
     refused: int = 0
@@ -147,7 +147,7 @@ class Flags:
 
 
 def run(flags: Flags, say: Callable[[str], Any] = print) -> int:
-    """Fuzz, say what was found; 1 for a crash, a hang, a message that is no line, or too much memory."""
+    """Fuzz, tell the faults found; 1 for a crash, a hang, a message that is no line, or too much memory."""
     require_number("seconds", flags.seconds, 0.0, above=True, unit="s")
     failed = False
     warnings.simplefilter("error", RuntimeWarning)  # a second line, beside the message

@@ -81,7 +81,7 @@ LEARNERS = (
 
 @dataclass(frozen=True, kw_only=True)
 class Flags:
-    """Train with every library, and judge what it learned; exits with 1 where one did not."""
+    """Train with every library, and judge the policies; exits with 1 where one did not."""
 
     folder: Annotated[Path, tyro.conf.arg(metavar="FOLDER")] = Path("build/learners")
     """Where `make test-learners` makes the virtual environment, and where policies and results are kept."""
@@ -90,7 +90,7 @@ class Flags:
 
 
 def main() -> int:
-    """Run what is not done yet, and print the table."""
+    """Run the trainings that are not done yet, and print the table."""
     flags = tyro.cli(Flags, prog="python -m benchmarks.learners")
     learners = [learner for learner in LEARNERS if not flags.only or learner.example in flags.only]
     results = [result_of(learner, flags.folder) for learner in learners]
@@ -140,12 +140,12 @@ def train(learner: Learner, python: Path, out: Path) -> None:
 
 
 def judge(before: PolicyFunction, after: PolicyFunction, must_learn: bool) -> dict[str, Any]:
-    """`compare` of two policies over the same episodes of `TASK`."""
+    """Return `compare` of two policies over the same episodes of `TASK`."""
     return compare(_returns(before), _returns(after), must_learn)
 
 
 def compare(before: NDArray, after: NDArray, must_learn: bool) -> dict[str, Any]:
-    """Whether a learner passes by its returns (EPISODES,) before and after the training."""
+    """Tell whether a learner passes by its returns (EPISODES,) before and after the training."""
     test: Any = wilcoxon(after, before, alternative="greater", zero_method="zsplit")
     means = {"before": float(before.mean()), "after": float(after.mean()), "better": int((after > before).sum())}
     passed = np.isfinite(after).all() and (test.pvalue < SIGNIFICANT or not must_learn)
@@ -185,7 +185,7 @@ print(json.dumps(record(policy, settings, name="recurrent", episodes={EPISODES})
 
 
 def _key(learner: Learner) -> str:
-    """Digest of what a result stands on: example, flags, environment."""
+    """Return the digest of a result's sources: example, flags, environment."""
     parts = [(EXAMPLES / f"{learner.example}.py").read_text(encoding="utf-8"), repr(learner)]
     return hashlib.sha256(json.dumps([*parts, fingerprint(Biped(TASK, 1))]).encode()).hexdigest()
 

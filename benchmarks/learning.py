@@ -1,4 +1,4 @@
-"""Training to time: our recipe and that of the first throw-away study, end to end; and what planning adds to it."""
+"""Training to time: our recipe and that of the first throw-away study, end to end; and the gain of planning."""
 
 from dataclasses import replace
 from functools import partial
@@ -27,7 +27,7 @@ PLANS_PER_TRAINING = 2
 
 
 def our_training(threads: int, update_steps: int | None = None) -> Case:
-    """One update of the default training: rollout, normalisation, PPO's epochs."""
+    """Return one update of the default training: rollout, normalisation, PPO's epochs."""
     config = PRESETS["walk"]
     config = replace(config, update_steps=update_steps or config.update_steps)
     settings = settings_to_json(config.environment)
@@ -39,7 +39,7 @@ def our_training(threads: int, update_steps: int | None = None) -> Case:
 
 
 def study_training(steps: int = 512) -> Case:
-    """One update of the study's recipe on the same environment: 8 in a DummyVecEnv, `steps` each, batch 512, 8 epochs.
+    """Return one update of the study's recipe: 8 environments in a DummyVecEnv, `steps` each, batch 512, 8 epochs.
 
     Its other numbers: discount .98, lambda .95, clip .2, step size 3e-4, 64 x 64 tanh, log_std -.7, one torch thread.
     """

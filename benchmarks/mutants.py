@@ -69,7 +69,7 @@ class MeasuredFile:
 
 @dataclass(frozen=True, kw_only=True)
 class Verdict:
-    """What tests said of a mutant."""
+    """Verdict of the tests on a mutant."""
 
     mutant: Mutant
     stage: str
@@ -210,7 +210,7 @@ def read_mutants(path: Path) -> list[Mutant]:
 
 
 def every_room(tree: Path) -> list[str]:
-    """Return the folders of all packages, where what was drawn in one room may lie in another version."""
+    """Return the folders of all packages, where lines drawn in one room may lie in another version."""
     project = tomllib.loads((tree / "pyproject.toml").read_text(encoding="utf-8"))
     return sorted({Path(folder).parts[0] for folder in project["tool"]["setuptools"]["package-dir"].values()})
 

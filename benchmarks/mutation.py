@@ -147,7 +147,7 @@ class _Scope:
 
 
 def _expressions(node: ast.AST, scope: _Scope) -> Iterator[tuple[ast.expr | ast.stmt, _Scope]]:
-    """Yield what may be changed below a node, with its scope."""
+    """Yield the expressions below a node that may be changed, with their scope."""
     if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
         counters = scope.counters | _counters(node)
         inner = _Scope(names=(*scope.names, node.name), inside_function=True, counters=counters)

@@ -41,7 +41,7 @@ BODIES = 16
 
 
 def costs(models: list[mujoco.MjModel], walk: Walk, rounds: int) -> NDArray:
-    """CPU time [us] per body of `mj_step` over one control window, all models in turn: (models, rounds x steps)."""
+    """Return the CPU time [us] per body of `mj_step` over a control window, in turn: (models, rounds x steps)."""
     physics = [Physics(model, walk.actions.shape[1]) for model in models]
     spent = np.empty((len(models), rounds + 1, len(walk.actions)))
     for round_ in range(rounds + 1):
@@ -60,7 +60,7 @@ def walked(
 
 
 def row(gait: Gait, reference: Gait) -> list[str]:
-    """One row's cells after its name and cost."""
+    """Return one row's cells after its name and cost."""
     m = gait.metrics
     angles = [_rms(gait, reference, name) for name in COLUMNS]
     force = _rms(gait, reference, "grf_vertical_bw")

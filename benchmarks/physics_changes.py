@@ -1,4 +1,4 @@
-"""What the rows of docs/results/cost.md change: physics settings, joint constants, and when rest angles move."""
+"""List the changes of the rows of docs/results/cost.md: physics, joint constants, and when rest angles move."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

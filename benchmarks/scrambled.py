@@ -1,4 +1,4 @@
-"""People scrambled, same bits: under the guide "plan" what a body, a search and a training do knows no curve of people.
+"""People scrambled, same bits: under the guide "plan" a body, a search and a training know no curve of people.
 
     python -m benchmarks.scrambled
 

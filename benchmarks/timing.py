@@ -1,4 +1,4 @@
-"""Interleaved timing: what is compared takes turns, so that a machine that slows down slows all of it."""
+"""Time by turns: programs that are compared take turns, so that a machine that slows down slows all of it."""
 
 import os
 import platform
@@ -75,13 +75,13 @@ def _figures(case: Case, wall: NDArray, cpu: NDArray) -> Figures:
 
 
 def _cpu_seconds(workers: Sequence[int]) -> float:
-    """CPU time [s] of this process with all its threads, and of its workers."""
+    """Return the CPU time [s] of this process with all its threads, and of its workers."""
     # The number of another process's clock, as the C library's clock_getcpuclockid makes it on Linux.
     return time.process_time() + sum(time.clock_gettime((~pid << 3) | 2) for pid in workers)
 
 
 def clock_cost() -> float:
-    """CPU time [s] that reading the CPU clock twice adds to what lies in between."""
+    """Return the CPU time [s] that reading the CPU clock twice adds to the work in between."""
     costs = np.empty(1000)
     for index in range(len(costs)):
         begin = time.process_time()
@@ -90,7 +90,7 @@ def clock_cost() -> float:
 
 
 def machine() -> dict[str, Any]:
-    """Processor, processors at our disposal, system, and the versions of what runs; never the machine's name."""
+    """Return processor, number of processors, system, and versions of the packages; never the machine's name."""
     model = platform.processor() or platform.machine()
     information = Path("/proc/cpuinfo")
     if information.exists():
@@ -106,7 +106,7 @@ def machine() -> dict[str, Any]:
 
 
 def processors() -> int:
-    """Processors this process may use."""
+    """Return the number of processors that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 

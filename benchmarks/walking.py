@@ -1,4 +1,4 @@
-"""A recorded walk, and the physics of that walk alone: what every step of ours is held against."""
+"""Record a walk, and run its physics alone, which every step of ours is held against."""
 
 import time
 from dataclasses import dataclass
@@ -110,7 +110,7 @@ class Physics:
 
 
 def step_over_physics(walk: Walk, num: int, rounds: int) -> tuple[NDArray, float]:
-    """CPU time [s] of (full step, its physics, the study's physics), taking turns step by step: (3, rounds x steps).
+    """Return the CPU time [s] of (full step, its physics, the study's), taking turns step by step: (3, rounds x steps).
 
     Also the largest difference [m, rad] between the walk of the full step and of its physics alone after a round.
     """
@@ -167,7 +167,7 @@ def step_over_plain(walk: Walk, num: int, rounds: int) -> dict[str, float]:
 
 
 def batch_case(walk: Walk, num: int, threads: int) -> Case:
-    """`mujoco.batch.Batch` alone, stepped through the walk's controls."""
+    """Return `mujoco.batch.Batch` alone, stepped through the walk's controls."""
     model = build_model(Body())
     batch = Batch(model, num, threads)
     substeps = round(CONTROL_WINDOW / model.opt.timestep)

@@ -1,4 +1,4 @@
-"""Whether the installed package does what README says: run in an empty folder, by the Python that has the wheel.
+"""Check that the installed package does as README says: run in an empty folder, by the Python that has the wheel.
 
     make test-wheel
 

@@ -51,7 +51,7 @@ def _trained() -> tuple[Any, Any]:
 
 
 def act(observation: np.ndarray) -> np.ndarray:
-    """Actions (N, 4) for observations (N, D) of the same N episodes, step after step."""
+    """Return actions (N, 4) for observations (N, D) of the same N episodes, step after step."""
     model, statistics = _trained()
     starts, seen = ~observation[:, LAST_ACTION].any(axis=1), statistics.normalize_obs(observation)
     known = act.memory if act.memory is not None and act.memory[0].shape[1] == len(observation) else None

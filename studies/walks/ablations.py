@@ -304,7 +304,7 @@ class Ablations(WalkingStudy):
         return Answer(text=text, files={"ablations.csv": ablations_csv(tables)}, failed=failed)
 
     def _train(self) -> bool:
-        """If `train` is set, train the missing seeds of each row of the table; return True if a training failed.
+        """Train the missing seeds of each row of the table if `train` is set; return True if a training failed.
 
         Raises `KeyboardInterrupt` if the user stopped one.
         """
