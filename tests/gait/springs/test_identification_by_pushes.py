@@ -208,6 +208,9 @@ def test_intervals_are_those_of_leaving_each_trial_out():
 def test_what_the_data_do_not_say_is_called_so():
     few = identify_pushed(**walks(trials=9), bounds=BOUNDS)[0]
     assert (few.verdict, few.reason) == (UNKNOWN, "9 trials are too few, 10 are needed") and few.stiffness is None
+    data = walks(trials=13)
+    more_states = identify_pushed(**(data | {"states": np.repeat(data["states"], 5, axis=1)}), bounds=BOUNDS)[0]
+    assert more_states.reason == "13 trials are too few, 14 are needed"  # twice five states and two curvatures
     data = walks(trials=20)
     alike = identify_pushed(**(data | {"velocity": -3 * data["angle"]}), bounds=BOUNDS)[0]
     assert alike.verdict == UNKNOWN and "as one" in alike.reason
@@ -215,6 +218,8 @@ def test_what_the_data_do_not_say_is_called_so():
     assert nowhere.samples == nowhere.trials == 0 and "too few" in nowhere.reason
     loud = identify_pushed(**walks(noise=300.0), bounds=BOUNDS)[0]
     assert loud.verdict == UNKNOWN and loud.reason.startswith("K")
+    assert loud.stiffness and loud.stiffness.low < 0.0 < loud.stiffness.high
+    assert loud.damping_time is None  # K beta over a K that may be 0
 
 
 @pytest.mark.parametrize(
