@@ -24,8 +24,8 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
 
     ## Description
     Trunk, thighs, shanks, feet and toes of a person of given height and mass. Hips and knees follow a phase controller
-    with human-like curves; ankles and toes are springs, torque = K (equilibrium - angle - beta x angular rate). The
-    policy sets K alone, 50 times a second (`decisions`). The equilibrium follows people's ankle (`equilibrium`).
+    with human-like curves; ankles and toes are springs, torque = K (rest angle - angle - beta x angular rate). The
+    policy sets K alone, 50 times a second (`decisions`). The rest angle follows the target's ankle (`equilibrium`).
 
     ## Action space
     `Box(-1, 1, (4,), float32)`, from -1 to 1 on a log scale over the stiffness range (`action_mode="absolute"`) or as
@@ -75,51 +75,51 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
     `Box(Min, Max, (43,), float32)`, dimensionless: each value is divided by its unit and clipped to its bounds. l is
     the leg length (hip to floor when standing, 0.53 of height), g gravity.
 
-    | Num | Observation             | Divided by  | Min  | Max | Meaning                                    |
-    | --- | ----------------------- | ----------- | ---- | --- | ------------------------------------------ |
-    | 0   | hip_height              | leg length  | 0    | 2   | height of the hip                          |
-    | 1   | pitch                   | rad         | -3.2 | 3.2 | pitch of the trunk, forward positive       |
-    | 2   | hip_left                | rad         | -3.2 | 3.2 | angle, flexion positive                    |
-    | 3   | knee_left               | rad         | -3.2 | 3.2 | angle, flexion positive                    |
-    | 4   | ankle_left              | rad         | -3.2 | 3.2 | angle, dorsiflexion positive               |
-    | 5   | toe_left                | rad         | -3.2 | 3.2 | angle, toe up positive                     |
-    | 6   | hip_right               | rad         | -3.2 | 3.2 | angle, flexion positive                    |
-    | 7   | knee_right              | rad         | -3.2 | 3.2 | angle, flexion positive                    |
-    | 8   | ankle_right             | rad         | -3.2 | 3.2 | angle, dorsiflexion positive               |
-    | 9   | toe_right               | rad         | -3.2 | 3.2 | angle, toe up positive                     |
-    | 10  | hip_velocity_x          | sqrt(g l)   | -5   | 5   | velocity of the hip, forward positive      |
-    | 11  | hip_velocity_z          | sqrt(g l)   | -5   | 5   | velocity of the hip, up positive           |
-    | 12  | pitch_rate              | sqrt(g/l)   | -15  | 15  | rate of the pitch, forward positive        |
-    | 13  | hip_rate_left           | sqrt(g/l)   | -15  | 15  | angular rate, flexion positive             |
-    | 14  | knee_rate_left          | sqrt(g/l)   | -15  | 15  | angular rate, flexion positive             |
-    | 15  | ankle_rate_left         | sqrt(g/l)   | -15  | 15  | angular rate, dorsiflexion positive        |
-    | 16  | toe_rate_left           | sqrt(g/l)   | -15  | 15  | angular rate, toe up positive              |
-    | 17  | hip_rate_right          | sqrt(g/l)   | -15  | 15  | angular rate, flexion positive             |
-    | 18  | knee_rate_right         | sqrt(g/l)   | -15  | 15  | angular rate, flexion positive             |
-    | 19  | ankle_rate_right        | sqrt(g/l)   | -15  | 15  | angular rate, dorsiflexion positive        |
-    | 20  | toe_rate_right          | sqrt(g/l)   | -15  | 15  | angular rate, toe up positive              |
-    | 21  | phase_sin               | 1           | -1   | 1   | sine of 2 pi x left stride phase           |
-    | 22  | phase_cos               | 1           | -1   | 1   | cosine of 2 pi x left stride phase         |
-    | 23  | phase_sin_2             | 1           | -1   | 1   | sine of 4 pi x left stride phase           |
-    | 24  | phase_cos_2             | 1           | -1   | 1   | cosine of 4 pi x left stride phase         |
-    | 25  | load_heel_left          | body weight | 0    | 5   | vertical force, mean of the step           |
-    | 26  | load_ball_left          | body weight | 0    | 5   | vertical force, mean of the step           |
-    | 27  | load_toe_left           | body weight | 0    | 5   | vertical force, mean of the step           |
-    | 28  | load_heel_right         | body weight | 0    | 5   | vertical force, mean of the step           |
-    | 29  | load_ball_right         | body weight | 0    | 5   | vertical force, mean of the step           |
-    | 30  | load_toe_right          | body weight | 0    | 5   | vertical force, mean of the step           |
-    | 31  | com_x_error             | leg length  | -2   | 2   | CoM minus plan, forward positive           |
-    | 32  | com_z_error             | leg length  | -2   | 2   | CoM minus plan, up positive                |
-    | 33  | speed_error             | sqrt(g l)   | -5   | 5   | forward speed of the CoM minus plan        |
-    | 34  | last_action_ankle_left  | 1           | -1   | 1   | action of the step before                  |
-    | 35  | last_action_toe_left    | 1           | -1   | 1   | action of the step before                  |
-    | 36  | last_action_ankle_right | 1           | -1   | 1   | action of the step before                  |
-    | 37  | last_action_toe_right   | 1           | -1   | 1   | action of the step before                  |
-    | 38  | planned_ankle_left      | rad         | -3.2 | 3.2 | the target's ankle angle at the leg's phase |
-    | 39  | planned_ankle_right     | rad         | -3.2 | 3.2 | the target's ankle angle at the leg's phase |
-    | 40  | leading_leg             | 1           | -1   | 1   | stance that began last: +1 left, -1 right  |
-    | 41  | command_speed           | sqrt(g l)   | 0    | 2   | commanded speed (Froude speed)             |
-    | 42  | height_ratio            | 1           | 0    | 2   | height / 1.70 m                            |
+    | Num | Observation             | Divided by  | Min  | Max | Meaning                                   |
+    | --- | ----------------------- | ----------- | ---- | --- | ----------------------------------------- |
+    | 0   | hip_height              | leg length  | 0    | 2   | height of the hip                         |
+    | 1   | pitch                   | rad         | -3.2 | 3.2 | pitch of the trunk, forward positive      |
+    | 2   | hip_left                | rad         | -3.2 | 3.2 | angle, flexion positive                   |
+    | 3   | knee_left               | rad         | -3.2 | 3.2 | angle, flexion positive                   |
+    | 4   | ankle_left              | rad         | -3.2 | 3.2 | angle, dorsiflexion positive              |
+    | 5   | toe_left                | rad         | -3.2 | 3.2 | angle, toe up positive                    |
+    | 6   | hip_right               | rad         | -3.2 | 3.2 | angle, flexion positive                   |
+    | 7   | knee_right              | rad         | -3.2 | 3.2 | angle, flexion positive                   |
+    | 8   | ankle_right             | rad         | -3.2 | 3.2 | angle, dorsiflexion positive              |
+    | 9   | toe_right               | rad         | -3.2 | 3.2 | angle, toe up positive                    |
+    | 10  | hip_velocity_x          | sqrt(g l)   | -5   | 5   | velocity of the hip, forward positive     |
+    | 11  | hip_velocity_z          | sqrt(g l)   | -5   | 5   | velocity of the hip, up positive          |
+    | 12  | pitch_rate              | sqrt(g/l)   | -15  | 15  | rate of the pitch, forward positive       |
+    | 13  | hip_rate_left           | sqrt(g/l)   | -15  | 15  | angular rate, flexion positive            |
+    | 14  | knee_rate_left          | sqrt(g/l)   | -15  | 15  | angular rate, flexion positive            |
+    | 15  | ankle_rate_left         | sqrt(g/l)   | -15  | 15  | angular rate, dorsiflexion positive       |
+    | 16  | toe_rate_left           | sqrt(g/l)   | -15  | 15  | angular rate, toe up positive             |
+    | 17  | hip_rate_right          | sqrt(g/l)   | -15  | 15  | angular rate, flexion positive            |
+    | 18  | knee_rate_right         | sqrt(g/l)   | -15  | 15  | angular rate, flexion positive            |
+    | 19  | ankle_rate_right        | sqrt(g/l)   | -15  | 15  | angular rate, dorsiflexion positive       |
+    | 20  | toe_rate_right          | sqrt(g/l)   | -15  | 15  | angular rate, toe up positive             |
+    | 21  | phase_sin               | 1           | -1   | 1   | sine of 2 pi x left stride phase          |
+    | 22  | phase_cos               | 1           | -1   | 1   | cosine of 2 pi x left stride phase        |
+    | 23  | phase_sin_2             | 1           | -1   | 1   | sine of 4 pi x left stride phase          |
+    | 24  | phase_cos_2             | 1           | -1   | 1   | cosine of 4 pi x left stride phase        |
+    | 25  | load_heel_left          | body weight | 0    | 5   | vertical force, mean of the step          |
+    | 26  | load_ball_left          | body weight | 0    | 5   | vertical force, mean of the step          |
+    | 27  | load_toe_left           | body weight | 0    | 5   | vertical force, mean of the step          |
+    | 28  | load_heel_right         | body weight | 0    | 5   | vertical force, mean of the step          |
+    | 29  | load_ball_right         | body weight | 0    | 5   | vertical force, mean of the step          |
+    | 30  | load_toe_right          | body weight | 0    | 5   | vertical force, mean of the step          |
+    | 31  | com_x_error             | leg length  | -2   | 2   | CoM minus plan, forward positive          |
+    | 32  | com_z_error             | leg length  | -2   | 2   | CoM minus plan, up positive               |
+    | 33  | speed_error             | sqrt(g l)   | -5   | 5   | forward speed of the CoM minus plan       |
+    | 34  | last_action_ankle_left  | 1           | -1   | 1   | action of the step before                 |
+    | 35  | last_action_toe_left    | 1           | -1   | 1   | action of the step before                 |
+    | 36  | last_action_ankle_right | 1           | -1   | 1   | action of the step before                 |
+    | 37  | last_action_toe_right   | 1           | -1   | 1   | action of the step before                 |
+    | 38  | planned_ankle_left      | rad         | -3.2 | 3.2 | target's ankle angle at the leg's phase   |
+    | 39  | planned_ankle_right     | rad         | -3.2 | 3.2 | target's ankle angle at the leg's phase   |
+    | 40  | leading_leg             | 1           | -1   | 1   | stance that began last: +1 left, -1 right |
+    | 41  | command_speed           | sqrt(g l)   | 0    | 2   | commanded speed (Froude speed)            |
+    | 42  | height_ratio            | 1           | 0    | 2   | height / 1.70 m                           |
 
     Where the action moves the person, 38 further entries tell the last offsets, whether the action sets the stiffness,
     the slope, the stiffness now, feet and body, and the length of the planned steps
@@ -344,7 +344,7 @@ def _info(values: NDArray, termination: int | np.integer) -> dict[str, Any]:
     """Return the info of one environment by name, from `StepResult.values` (len(INFO),) and the code of the
     termination.
 
-    The numbers are Python's, as wrappers copy every info, and NumPy's take a third longer to copy.
+    The numbers are Python's, as wrappers copy every info, and NumPy's take a quarter longer to copy.
     """
     info = dict(_NO_INFO)  # of its full size: an empty one would grow name by name
     info.update(zip(INFO, values.tolist(), strict=False))  # in every step: strict would take half as long again

@@ -61,7 +61,7 @@ def _entries() -> tuple[Entry, ...]:
         Entry("speed_error", "sqrt(g l)", -5.0, 5.0, "forward speed of the CoM minus plan"),
         *(Entry(f"last_action_{name}", "1", -1.0, 1.0, "action of the step before", False) for name in ACTIONS),
         *(
-            Entry(f"planned_ankle_{side}", "rad", -3.2, 3.2, "the target's ankle angle at the leg's phase", False)
+            Entry(f"planned_ankle_{side}", "rad", -3.2, 3.2, "target's ankle angle at the leg's phase", False)
             for side in SIDES
         ),
         Entry("leading_leg", "1", -1.0, 1.0, "stance that began last: +1 left, -1 right", False),

@@ -178,11 +178,11 @@ def _spring_panels(recording: Recording) -> list[dict[str, Any]]:
     feedback departs from it.
     """
     curves = schedule_curves(recording)
-    group = "Stiffness and equilibrium over the leg's phase"
+    group = "Stiffness and rest angle over the leg's phase"
     panels = []
     for column, words, unit in (
         ("stiffness_Nm_per_rad", "stiffness K", "N·m/rad"),
-        ("equilibrium_deg", "equilibrium θ_eq", "dorsiflexion or up, deg"),
+        ("equilibrium_deg", "rest angle θ_eq", "dorsiflexion or up, deg"),
     ):
         for joint in SPRINGS:
             names = [f"{joint}_{side}_{column}" for side in SIDES]

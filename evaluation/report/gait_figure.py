@@ -157,7 +157,7 @@ def _draw_springs(axes: NDArray, legs: Legs, human: HumanGait) -> None:
     """
     _draw_stiffness(axes[:2], legs)
     ax = axes[2]
-    ax.set(title="Ankle and its equilibrium", ylabel="dorsiflexion (deg)")
+    ax.set(title="Ankle and its rest angle", ylabel="dorsiflexion (deg)")
     _draw_people(ax, np.degrees(human.mean("ankle", PERCENT / 100)), np.degrees(human.sd("ankle", PERCENT / 100)))
     _draw_model(ax, legs, "ankle_dorsiflexion_deg")
     for curves, colour in legs:

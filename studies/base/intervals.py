@@ -1,7 +1,7 @@
 """Compute intervals of means and fractions, and a test of two policies' falls in the same episodes."""
 
 import numpy as np
-from scipy.stats import binomtest, bootstrap, norm
+from scipy.stats import binomtest, bootstrap, norm, t
 
 from springfoot.arrays import NDArray
 
@@ -31,6 +31,16 @@ def mean_interval(values: NDArray, level: float = LEVEL) -> tuple[float, float]:
         rng=np.random.default_rng(0),
     )
     return float(result.confidence_interval.low), float(result.confidence_interval.high)
+
+
+def student_interval(values: NDArray, level: float = LEVEL) -> tuple[float, float]:
+    """Return Student's interval of the mean of a sample (n,) of a few values, such as persons' means, which a bootstrap
+    takes for too narrow. For a single value both ends are that value."""
+    mean = float(np.mean(values))
+    if len(values) < 2:
+        return mean, mean
+    reach = float(t.ppf(0.5 + level / 2, len(values) - 1) * np.std(values, ddof=1) / np.sqrt(len(values)))
+    return mean - reach, mean + reach
 
 
 def visible(differences: NDArray) -> float | None:

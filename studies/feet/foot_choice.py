@@ -25,7 +25,7 @@ from springfoot.envs.settings import FootSetting, body_of, foot_setting, setting
 from springfoot.errors import SpringfootError, require_number
 from springfoot.evaluation.numbers import Gait, effort_numbers, measure
 from springfoot.evaluation.page import foot_words, write_page
-from springfoot.evaluation.recording import Recording, record_feet
+from springfoot.evaluation.recording import WARM_UP, Recording, record_feet
 from springfoot.evaluation.report import STYLE
 from springfoot.files.markdown import MISSING, table, text_of
 
@@ -39,6 +39,8 @@ from .walked_speeds import TWO_PRICES, Row, rows_csv
 
 MOST_FEET = 8
 """Feet that the colours of a report tell apart."""
+LEAST_SECONDS = 2 * WARM_UP
+"""Shortest episode [s]; chosen: the first `WARM_UP` seconds do not count, and strides must follow."""
 SIDES_OF = {"left": ("left_foot",), "right": ("right_foot",), "both": ("left_foot", "right_foot")}
 """Side -> settings of its feet."""
 OTHER_SPEED = 0.15
@@ -139,6 +141,7 @@ class FootChoice(WalkingStudy):
     def check(self) -> None:
         """Refuse feet that are missing, too many or alike, and numbers out of range."""
         super().check()
+        require_number("seconds", self.seconds, LEAST_SECONDS, unit="s")
         require_number("push_newton", self.push_newton, 0.0, unit="N")
         if bool(self.spring) == bool(self.foot):
             raise SpringfootError(
@@ -290,7 +293,7 @@ class FootChoice(WalkingStudy):
         price, changes against the foot `first`."""
         calf = "" if self.calf is None else f", calves of {self.calf:.0%}"
         worn = "both feet" if self.side == "both" else f"the {self.side} foot"
-        intervals = "" if len(self.persons) == 1 else ", with 95 % intervals over persons and episodes"
+        intervals = "" if len(self.persons) == 1 else ", with 95 % intervals over persons"
         prices = (
             ""
             if speed is None

@@ -2,6 +2,7 @@
 
 Every person walks the same episodes on every foot, so that feet are compared in pairs of episodes. Two feet are told
 apart if they differ by `GAP` or more, the 95 % interval of the difference leaves 0 out, and every person has its sign.
+The interval is over persons, as one person's episodes are alike and say nothing of how others learn.
 A slower walk has another price: so prices are taken at one speed that all walk, between two walks at two commanded
 speeds, never beyond them.
 """
@@ -13,7 +14,7 @@ import numpy as np
 
 from springfoot.arrays import NDArray
 
-from ..base.intervals import mean_interval
+from ..base.intervals import student_interval
 
 GAP = 0.05
 """Least difference that is told apart: in a trial a network trained on one foot alone walked up to 5 % cheaper
@@ -38,7 +39,7 @@ class Difference:
     def text(self) -> str:
         """Return the difference in percent with its interval, such as "−8 % (−10 to −6)".
 
-        Of one person there is no interval: episodes hardly differ, and it would know nothing of how others learn.
+        Of one person there is no interval.
         """
         interval = f" ({_percent(self.low)} to {_percent(self.high)})" if self.persons > 1 else ""
         return f"{_percent(self.mean)} %{interval}"
@@ -46,11 +47,15 @@ class Difference:
 
 def difference(prices: NDArray, others: NDArray) -> Difference:
     """Return the difference of a foot's `prices` from another foot's prices `others`, both (P, E), of the same P
-    persons in the same E episodes."""
+    persons in the same E episodes.
+
+    The interval is Student's, of the persons' means; of one person, of its episodes.
+    """
     shares = prices / others - 1.0
-    low, high = mean_interval(shares.ravel())
-    mean = float(shares.mean())
-    signs = np.sign(shares.mean(1))
+    of_persons = shares.mean(1)
+    low, high = student_interval(of_persons if len(shares) > 1 else shares[0])
+    mean = float(of_persons.mean())
+    signs = np.sign(of_persons)
     apart = abs(mean) >= GAP and (low > 0.0 or high < 0.0) and bool((signs == signs[0]).all())
     return Difference(mean=mean, low=low, high=high, persons=len(prices), told_apart=apart)
 

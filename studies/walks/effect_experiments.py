@@ -300,7 +300,7 @@ EXPERIMENTS: dict[str, Experiment | str] = {
         conditions=_HINGES,
         speed=0.8,
         walked=False,
-        effect=per_unit("right_knee_least_in_swing_deg", {k: k / degrees(1.0) for k in _HINGES}, factor=-1.0),
+        effect=per_unit("right_knee_least_in_stance_deg", {k: k / degrees(1.0) for k in _HINGES}, factor=-1.0),
         note="least flexion of the mean curve in stance, turned around, for each N·m/deg",
     ),
     "afo_stop_knee": _STROKE,

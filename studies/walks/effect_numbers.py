@@ -36,7 +36,7 @@ EFFECT_NUMBERS = (
     *("push_off_J_kg", "collision_J_kg", "com_positive_W_kg", "hip_share"),
     *("dorsiflexion_deg", "ankle_power_W_kg", "ankle_moment_Nm_kg", "knee_moment_Nm_kg", "ankle_fibres_Nm"),
     *("right_push_off_J_kg", "right_com_push_off_J_kg", "right_hip_net_J_kg", "right_forward_bw"),
-    *("right_knee_at_toe_off_deg", "right_knee_least_in_swing_deg", "clearance_sound_less_right_m"),
+    *("right_knee_at_toe_off_deg", "right_knee_least_in_stance_deg", "clearance_sound_less_right_m"),
     *("knee_loading_deg", "knee_swing_deg"),
 )
 """Names of the numbers. They are part of the question of kept results, so that a new number has all walks measured
@@ -130,7 +130,7 @@ def _right_leg_numbers(gait: Gait) -> dict[str, float | None]:
         "right_hip_net_J_kg": work["hip"]["positive"] - work["hip"]["negative"],
         "right_forward_bw": right["forward_peak_bw"],
         "right_knee_at_toe_off_deg": float(np.interp(right["stance_percent"], PERCENT, knee)),
-        "right_knee_least_in_swing_deg": float(knee[right["stance_percent"] >= PERCENT].min()),
+        "right_knee_least_in_stance_deg": float(knee[right["stance_percent"] >= PERCENT].min()),
         "clearance_sound_less_right_m": left["toe_clearance_m"] - right["toe_clearance_m"],
     }
 

@@ -60,6 +60,7 @@ def test_what_is_said_follows_from_prices_csv(tmp_path, capsys):
     [
         ([], "give either --spring or --foot, such as --spring 0 2 4 6 or --foot intact --foot rigid"),
         (["--spring", "0", "2", "--foot", "rigid"], "give either --spring or --foot, such as"),
+        (["--spring", "0", "2", "--seconds", "3"], "seconds must be a finite number >= 6 s, got 3.0"),
         (["--spring", "2"], "give 2 to 8 different springs or feet, got 1"),
         (["--foot", "rigid", "--foot", "rigid"], "give 2 to 8 different springs or feet, got 1"),
         (["--spring", *map(str, range(9))], "give 2 to 8 different springs or feet, got 9"),

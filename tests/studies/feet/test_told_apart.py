@@ -51,6 +51,13 @@ def test_the_verdict_names_the_least_its_like_and_the_dearer():
     )
 
 
+def test_the_interval_is_over_persons_whatever_the_number_of_their_episodes():
+    of_persons = np.array([-0.63, -0.43, -0.53])
+    found = difference(np.repeat(1.0 + of_persons[:, None], 50, axis=1), np.ones((3, 50)))
+    reach = 4.302653 * 0.1 / np.sqrt(3)  # Student's t of two degrees of freedom at 97.5 %
+    assert (found.low, found.high) == pytest.approx((-0.53 - reach, -0.53 + reach), rel=1e-6)
+
+
 def test_one_person_has_no_interval():
     assert difference(np.full((1, 5), 2.7), np.full((1, 5), 3.0)).text == "−10 %"
 
