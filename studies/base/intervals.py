@@ -1,5 +1,7 @@
 """Compute intervals of means and fractions, and a test of two policies' falls in the same episodes."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.stats import binomtest, bootstrap, norm, t
 
@@ -33,14 +35,24 @@ def mean_interval(values: NDArray, level: float = LEVEL) -> tuple[float, float]:
     return float(result.confidence_interval.low), float(result.confidence_interval.high)
 
 
-def student_interval(values: NDArray, level: float = LEVEL) -> tuple[float, float]:
-    """Return Student's interval of the mean of a sample (n,) of a few values, such as persons' means, which a bootstrap
-    takes for too narrow. For a single value both ends are that value."""
-    mean = float(np.mean(values))
-    if len(values) < 2:
-        return mean, mean
-    reach = float(t.ppf(0.5 + level / 2, len(values) - 1) * np.std(values, ddof=1) / np.sqrt(len(values)))
-    return mean - reach, mean + reach
+def of_persons(values: Sequence[NDArray]) -> NDArray:
+    """Return the sample (n,) whose spread tells how well a mean is known, from the values (E,) of each person in its
+    episodes: the persons' means, as one person's episodes say nothing of how others learn; of one person its episodes.
+
+    A person without values is left out.
+    """
+    found = [own for own in values if len(own)]
+    return np.array([own.mean() for own in found]) if len(found) > 1 else np.concatenate([*found, np.empty(0)])
+
+
+def interval_of_persons(values: Sequence[NDArray], level: float = LEVEL) -> tuple[float, float]:
+    """Return the interval of the mean of `of_persons` from the same values: Student's for several persons, as a
+    bootstrap of a few is too narrow; of one person `mean_interval`."""
+    sample = of_persons(values)
+    if sum(1 for own in values if len(own)) < 2:
+        return mean_interval(sample, level)
+    reach = float(t.ppf(0.5 + level / 2, len(sample) - 1) * np.std(sample, ddof=1) / np.sqrt(len(sample)))
+    return float(sample.mean()) - reach, float(sample.mean()) + reach
 
 
 def visible(differences: NDArray) -> float | None:

@@ -14,7 +14,7 @@ import numpy as np
 
 from springfoot.arrays import NDArray
 
-from ..base.intervals import student_interval
+from ..base.intervals import interval_of_persons
 
 GAP = 0.05
 """Least difference that is told apart: in a trial a network trained on one foot alone walked up to 5 % cheaper
@@ -53,7 +53,7 @@ def difference(prices: NDArray, others: NDArray) -> Difference:
     """
     shares = prices / others - 1.0
     of_persons = shares.mean(1)
-    low, high = student_interval(of_persons if len(shares) > 1 else shares[0])
+    low, high = interval_of_persons([*shares])
     mean = float(of_persons.mean())
     signs = np.sign(of_persons)
     apart = abs(mean) >= GAP and (low > 0.0 or high < 0.0) and bool((signs == signs[0]).all())

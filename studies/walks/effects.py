@@ -22,7 +22,7 @@ from springfoot.errors import SpringfootError, perhaps
 from springfoot.files.markdown import MISSING, table
 from springfoot.files.text_table import read_csv
 
-from ..base.intervals import mean_interval
+from ..base.intervals import interval_of_persons, of_persons
 from ..base.study import Answer, OnProgress, PersonsStudy
 from ..feet.walked_speeds import Row, at_walked_speeds, rows_csv
 from .condition_effects import Measured, by_condition
@@ -87,7 +87,8 @@ class Effects(PersonsStudy):
                 f"**{verdict(rows)}**",
                 effects_table([row for row in rows if row["run"]]),
                 f"Persons: {', '.join(self.persons)}; {self.what_ran} of each condition. In brackets 95 % intervals "
-                "over persons and episodes; a sign is unclear where the interval holds 0 or one episode is left. "
+                "over persons, of one person over its episodes; a sign is unclear where the interval holds 0 or one "
+                "episode is left. "
                 "Energy and work are compared "
                 "where all conditions walk equally fast, all else at the commanded speed. effects.csv tells the rest.",
                 *without,
@@ -150,10 +151,10 @@ def effect_row(
         }
     notes = [experiment.note, *_falls_by_condition(walks.values())]
     if all(map(len, values.values())):
-        pairs = np.concatenate(list(values.values()))
+        pairs = np.concatenate(list(values.values()))  # (pairs,), a person's episode under both conditions
         # Clauses of the published tolerance beside its range.
         clauses = {words: all(map(holds, measured.values())) for words, holds in experiment.also.items()}
-        row |= _agreement(published, pairs, clauses)
+        row |= _agreement(published, list(values.values()), clauses)
         if len(pairs) < (episodes := sum(len({walk["episode"] for walk in own}) for own in walks.values())):
             notes.append(f"of {len(pairs)} of {episodes} episodes, in which all walk, and as fast")
         notes += [f"{words}: {'yes' if holds else 'no'}" for words, holds in clauses.items()]
@@ -172,16 +173,18 @@ def effect_row(
     return row | ({person: _mean([own]) for person, own in values.items()} if len(values) > 1 else {})
 
 
-def _agreement(published: Mapping[str, str], pairs: NDArray, clauses: Mapping[str, bool]) -> dict[str, Any]:
-    """Return the effect measured in N episodes, `pairs` (N,): its mean, its 95 % interval, whether its sign is that
-    published (`sign_is`), and whether its size is within the published tolerance (`size_within`) with its `clauses`."""
-    low, high = mean_interval(pairs) if len(pairs) > 1 else (None, None)
-    mean = float(pairs.mean())
+def _agreement(published: Mapping[str, str], values: Sequence[NDArray], clauses: Mapping[str, bool]) -> dict[str, Any]:
+    """Return the effect measured, `values` (E,) of each person in its episodes: its mean, its 95 % interval, whether
+    its sign is that published (`sign_is`), and whether its size is within the published tolerance (`size_within`) with
+    its `clauses`."""
+    sample = of_persons(values)
+    low, high = interval_of_persons(values) if len(sample) > 1 else (None, None)
+    mean = float(sample.mean())
     return {
         "measured": mean,
         "low": low,
         "high": high,
-        "pairs": len(pairs),
+        "pairs": sum(map(len, values)),
         "sign_is": sign_is(published["sign"], low, high),
         "size_within": size_within(published, mean, clauses),
     }

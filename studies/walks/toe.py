@@ -8,7 +8,7 @@ ankles the toe's spring is all it has, as in a prosthesis (McDonald et al. 2021)
 compared where they walk equally fast, so a price is that of the kept speed.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Any, NamedTuple
@@ -18,7 +18,7 @@ import numpy as np
 from springfoot.arrays import NDArray
 from springfoot.files.markdown import MISSING, table, text_of
 
-from ..base.intervals import mean_interval, visible
+from ..base.intervals import interval_of_persons, of_persons, visible
 from ..base.study import Answer, OnProgress, PersonsStudy
 from ..feet.both_feet import both, braced
 from ..feet.walked_speeds import ASKED_SPEEDS, WALKED_SPEEDS, Row, at_walked_speeds, rows_csv
@@ -127,8 +127,8 @@ class ToeJoint(PersonsStudy):
         asked = ", ".join(f"{speed:g}" for speed in self._commanded_speeds())
         return (
             f"Both feet, walking {shown:g} m/s; in brackets the difference from the free toe, with passive ankles from "
-            "the locked one, and its 95 % interval over persons and starts: of one person it tells how starts differ, "
-            "and no more. Springs in N·m/rad, at a sound toe beside its muscles. "
+            "the locked one, and its 95 % interval over persons: of one person over its starts, which tell no "
+            "more. Springs in N·m/rad, at a sound toe beside its muscles. "
             f"Persons: {', '.join(self.persons)}; {self.what_ran} of each toe and commanded speed, {asked} m/s; falls "
             "are of all. People's effects are of docs/effects.csv; McDonald's people had one such foot. `learned` "
             "learned with locked and absent toes and passive feet on one side alone, and each with springs of 10 to "
@@ -165,14 +165,9 @@ def compared_rows(speed: float, measured: Mapping[str, Measured]) -> list[dict[s
         apart = difference(number, toe, against)
         relative = change(number, toe, against)
         row = {**toe._asdict(), "speed_m_s": speed, "number": number}
-        row |= {
-            "mean": _mean(
-                _finite_values(lambda numbers, toe=toe, number=number: numbers[toe][number], measured.values())
-            )
-        }
-        rows.append(
-            row | _paired_numbers(apart, measured) | {"percent": _mean(_finite_values(relative, measured.values()))}
-        )
+        row |= {"mean": _mean_over_persons(lambda numbers, toe=toe, number=number: numbers[toe][number], measured)}
+        percent = _mean_over_persons(relative, measured)
+        rows.append(row | _paired_numbers(apart, measured) | {"percent": percent})
     return rows
 
 
@@ -192,21 +187,26 @@ def beside_rows(speed: float, measured: Mapping[str, Measured]) -> list[dict[str
 
 
 def _paired_numbers(effect: Effect, measured: Mapping[str, Measured]) -> dict[str, Any]:
-    """Return the mean of an effect over all pairs (a person's episode under both conditions), its 95 % interval, the
-    smallest effect that so many pairs would show (`visible`), the number of pairs, and for several persons the mean of
-    each."""
-    values = _finite_values(effect, measured.values())
-    low, high = mean_interval(values) if len(values) > 1 else (None, None)
-    own = {person: _mean(_finite_values(effect, [numbers])) for person, numbers in measured.items()}
-    seen = visible(values)
-    row = {"difference": _mean(values), "low": low, "high": high, "visible": seen, "pairs": len(values)}
-    return row | (own if len(own) > 1 else {})
+    """Return the mean of an effect over persons (of one person over its pairs, an episode under both conditions), its
+    95 % interval, the smallest effect that so many would show (`visible`), the number of pairs, and for several persons
+    the mean of each."""
+    values = {person: _finite_values(effect, numbers) for person, numbers in measured.items()}
+    sample = of_persons(list(values.values()))
+    low, high = interval_of_persons(list(values.values())) if len(sample) > 1 else (None, None)
+    row = {"difference": _mean(sample), "low": low, "high": high, "visible": visible(sample)}
+    own = {person: _mean(of_person) for person, of_person in values.items()}
+    return row | {"pairs": sum(map(len, values.values()))} | (own if len(own) > 1 else {})
 
 
-def _finite_values(effect: Effect, measured: Iterable[Measured]) -> NDArray:
-    """Return the finite values (pairs,) of an effect, over the episodes of all persons; the others are left out."""
+def _mean_over_persons(effect: Effect, measured: Mapping[str, Measured]) -> float | None:
+    """Return the mean over persons of an effect's finite values; None without any."""
+    return _mean(of_persons([_finite_values(effect, numbers) for numbers in measured.values()]))
+
+
+def _finite_values(effect: Effect, numbers: Measured) -> NDArray:
+    """Return the finite values (pairs,) of an effect over a person's episodes; the others are left out."""
     with np.errstate(invalid="ignore", divide="ignore"):  # a number that is 0, such as the work of a locked toe
-        values = np.concatenate([effect(numbers) for numbers in measured])
+        values = effect(numbers)
     return values[np.isfinite(values)]
 
 

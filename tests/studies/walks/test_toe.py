@@ -69,7 +69,8 @@ def test_planted_differences_at_equal_walked_speed_are_paired_by_start_and_told_
     row = found(compared_rows(1.05, measured), Toe(SOUND_ANKLES, TOE_LOCKED), FIBRE)
     # The locked toe walks 0.1 m/s slower than commanded: at equal speed it costs 0.2 more than at equal command.
     assert (row["one"], row["two"], row["difference"]) == pytest.approx((0.7, 0.9, 0.8))
-    assert 0.7 <= row["low"] < 0.8 < row["high"] <= 0.9 and row["pairs"] == 8
+    reach = 12.706205 * 0.1  # Student's t of one degree of freedom, the error of the mean of two persons
+    assert (row["low"], row["high"]) == pytest.approx((0.8 - reach, 0.8 + reach), rel=1e-6) and row["pairs"] == 8
     foot = found(compared_rows(1.05, measured), Toe(SOUND_ANKLES, TOE_LOCKED), FOOT_WORK)
     assert foot["mean"] == 2.0 and foot["difference"] == 0.0
 
