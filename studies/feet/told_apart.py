@@ -49,7 +49,7 @@ def difference(prices: NDArray, others: NDArray) -> Difference:
     """Return the difference of a foot's `prices` from another foot's prices `others`, both (P, E), of the same P
     persons in the same E episodes.
 
-    The interval is Student's, of the persons' means; of one person, of its episodes.
+    The interval is that of `interval_of_persons`.
     """
     shares = prices / others - 1.0
     of_persons = shares.mean(1)

@@ -127,8 +127,8 @@ class ToeJoint(PersonsStudy):
         asked = ", ".join(f"{speed:g}" for speed in self._commanded_speeds())
         return (
             f"Both feet, walking {shown:g} m/s; in brackets the difference from the free toe, with passive ankles from "
-            "the locked one, and its 95 % interval over persons: of one person over its starts, which tell no "
-            "more. Springs in N·m/rad, at a sound toe beside its muscles. "
+            "the locked one, and its 95 % interval over persons: of one person over its starts, which "
+            "say nothing of others. Springs in N·m/rad, at a sound toe beside its muscles. "
             f"Persons: {', '.join(self.persons)}; {self.what_ran} of each toe and commanded speed, {asked} m/s; falls "
             "are of all. People's effects are of docs/effects.csv; McDonald's people had one such foot. `learned` "
             "learned with locked and absent toes and passive feet on one side alone, and each with springs of 10 to "
