@@ -81,6 +81,7 @@ def readers(folder: Path) -> dict[str, Reader]:
         "own data over time": Reader(read=_own, suffix=".csv", bases=(_over_time(),)),
         "own data of OpenSim": Reader(read=_own, suffix=".mot", bases=(_opensim(),)),
         "own data of Visual3D": Reader(read=_own, suffix=".txt", bases=(_visual3d(),)),
+        "own data of Nexus": Reader(read=_own, suffix=".csv", bases=(_nexus(),)),
         "own data, C3D": Reader(read=_own, suffix=".c3d", bases=_c3d(folder)),
         "foot, table": Reader(read=_foot, suffix=".csv", bases=(_foot_table(),)),
         "foot, JSON": Reader(read=_foot, suffix=".json", bases=tuple(json.dumps(foot).encode() for foot in _FEET)),
@@ -343,6 +344,22 @@ def _visual3d() -> bytes:
     heads = [f"\t{word}" * (len(columns) - 1) for word in ("walk.c3d", "LINK_MODEL_BASED", "ORIGINAL")]
     components = "ITEM" + "\tX" * (len(columns) - 1)
     return "\n".join([heads[0], names, *heads[1:], components, *rows, ""]).encode()
+
+
+def _nexus() -> bytes:
+    people = human_gait(1.2)
+    frames = np.arange(1, 201)
+    columns = {"Frame": frames, "Sub Frame": 0 * frames}
+    for letter, offset in (("L", 0.2), ("R", 0.7)):
+        for name, joint in {"hip": "Hip", "knee": "Knee", "ankle": "Ankle"}.items():
+            angle = np.degrees(people.mean(name, frames / 100 / people.stride_time + offset))
+            columns |= {f"A:{letter}{joint}Angles {axis}": angle for axis in "XYZ"}
+    rows = _table(columns).decode().splitlines()[1:]
+    names = ",,".join(["", *(f"{column[:-2]}," for column in columns if column.endswith(" X"))])
+    components = ",".join(["Frame", "Sub Frame", *"XYZ" * 6])
+    strikes = [f"A,{side},Foot Strike,{0.3 * k + 0.2}," for k, side in enumerate(("Left", "Right") * 3)]
+    head = ["Events", "100", "Subject,Context,Name,Time (s),Description", *strikes, ""]
+    return "\n".join([*head, "Model Outputs", "100", names, components, ",,deg", *rows, ""]).encode()
 
 
 def _c3d(folder: Path) -> tuple[bytes, ...]:

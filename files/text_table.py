@@ -46,10 +46,18 @@ class Table:
         """Tell whether the table has the column, with at least one cell that is not empty."""
         return column in self.columns and any(cells[self.columns.index(column)].strip() for _, cells in self.rows)
 
-    def numbers(self, column: str) -> NDArray:
-        """Return a column's cells as finite numbers; raise `SpringfootError` for any other cell."""
+    def numbers(self, column: str, gaps: bool = False) -> NDArray:
+        """Return a column's cells as finite numbers; raise `SpringfootError` for any other cell.
+
+        With `gaps` an empty cell is NaN.
+        """
         index = self.columns.index(column)
-        return np.array([self._number(line, column, cells[index]) for line, cells in self.rows])
+        return np.array(
+            [
+                np.nan if gaps and not cells[index].strip() else self._number(line, column, cells[index])
+                for line, cells in self.rows
+            ]
+        )
 
     def ascending(self, column: str) -> NDArray:
         """Return a column's cells as `numbers` does; raise `SpringfootError` unless each is greater than the one

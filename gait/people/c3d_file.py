@@ -4,7 +4,8 @@ The x components of Plug-in Gait's angles and moments have our signs; its pelvis
 pelvis. If the ankle moment is negative on average, the moments are external ones, and the signs of all are turned.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from math import prod
 from pathlib import Path
 from typing import Any
@@ -27,17 +28,29 @@ _PLUG_IN_GAIT = {"hip": "HipAngles", "knee": "KneeAngles", "ankle": "AnkleAngles
 }
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Recording:
+    """A recording of a laboratory that ran Plug-in Gait: points, events and force plates."""
+
+    name: str
+    """The file's name."""
+    rate: float
+    """Frames a second."""
+    first_frame: int
+    points: Mapping[str, NDArray]
+    """Name of a marker or of an output -> its x, y and z (3, T) in T frames; NaN in gaps."""
+    moments_in_nm: bool = False
+    """True if moments are in N m/kg, False for N mm/kg."""
+    events: Mapping[str, Contacts] = field(default_factory=dict)
+    """Side -> foot strikes and foot offs marked by the laboratory."""
+    plates: Sequence[Any] = ()
+    """Force plates, as ezc3d gives them: force (3, samples), its unit, and centre of pressure."""
+
+
 def read_c3d(path: Path) -> Trial:
-    """Return the walk in a C3D file with Plug-in Gait output; `c3d_process` calls this in a child process.
+    """Return the walk in a C3D file, as `trial_of_recording` does; `c3d_process` calls this in a child process.
 
-    It reads these, and for the right leg the same with R in place of L:
-    - the x components of `LHipAngles`, `LKneeAngles`, `LAnkleAngles`, `LPelvisAngles` [deg], of the Oxford Foot Model's
-      `LHXFFA` (toe) [deg], and of `LHipMoment`, `LKneeMoment`, `LAnkleMoment` [N mm/kg or N m/kg];
-    - the events Foot Strike and Foot Off;
-    - the force plates; the markers `LHEE` and `LTOE` tell the foot on each plate, and the forward direction.
-
-    Frames with gaps at the beginning and end of the record are left out. Raises `SpringfootError` for a file that ezc3d
-    cannot read, and for a gap between other frames.
+    Raises `SpringfootError` for a file that ezc3d cannot read, and for a gap within the walk.
     """
     import ezc3d  # an extra: only C3D files need it
 
@@ -51,35 +64,59 @@ def read_c3d(path: Path) -> Trial:
         raise SpringfootError(f"{path.name} is not a C3D file that ezc3d can read: {error}") from None
     points = file["data"]["points"]
     parameters = file["parameters"]
-    rate = float(file["header"]["points"]["frame_rate"])
+    header = file["header"]["points"]
     # A label is NAME or SUBJECT:NAME; a marker's first three rows are x, y, z.
     labels = [label.rpartition(":")[2].strip() for label in parameters["POINT"]["LABELS"]["value"]]
-    markers = {label: points[:3, k] for k, label in enumerate(labels)}
+    return trial_of_recording(
+        Recording(
+            name=path.name,
+            rate=float(header["frame_rate"]),
+            first_frame=int(header["first_frame"]),
+            points={label: points[:3, k] for k, label in enumerate(labels)},
+            # Plug-in Gait writes N mm/kg unless the file says N m.
+            moments_in_nm=parameters["POINT"].get("MOMENT_UNITS", {}).get("value", ["Nmm"])[0].strip() == "Nm",
+            events=_events(parameters.get("EVENT", {})),
+            plates=file["data"].get("platform") or [],
+        )
+    )
+
+
+def trial_of_recording(recording: Recording) -> Trial:
+    """Return the walk in a recording with Plug-in Gait's output.
+
+    It reads these, and for the right leg the same with R in place of L:
+    - the x components of `LHipAngles`, `LKneeAngles`, `LAnkleAngles`, `LPelvisAngles` [deg], of the Oxford Foot Model's
+      `LHXFFA` (toe) [deg], and of `LHipMoment`, `LKneeMoment`, `LAnkleMoment`;
+    - the events Foot Strike and Foot Off;
+    - the force plates; the markers `LHEE` and `LTOE` tell the foot on each plate, and the forward direction.
+
+    Frames with gaps at the beginning and end of the record are left out. Raises `SpringfootError` for a gap between
+    other frames.
+    """
+    points = recording.points
     legs: dict[str, Series] = {side: {} for side in FILE_SIDES}
-    # Plug-in Gait writes N mm/kg unless the file says N m.
-    newton_metres = parameters["POINT"].get("MOMENT_UNITS", {}).get("value", ["Nmm"])[0].strip() == "Nm"
     for side, curves in legs.items():
         letter = side[0].upper()  # L or R
         for curve, label in _PLUG_IN_GAIT.items():
-            if letter + label in markers:
-                x = markers[letter + label][0]
-                curves[curve] = np.radians(x) if "moment" not in curve else x * (1.0 if newton_metres else 1e-3)
-        if "hip" in curves and f"{letter}PelvisAngles" in markers:
-            curves["thigh"] = curves["hip"] - np.radians(markers[f"{letter}PelvisAngles"][0])
+            if letter + label in points:
+                x = points[letter + label][0]
+                is_moment = curve.endswith("_moment")
+                curves[curve] = x * (1.0 if recording.moments_in_nm else 1e-3) if is_moment else np.radians(x)
+        if "hip" in curves and f"{letter}PelvisAngles" in points:
+            curves["thigh"] = curves["hip"] - np.radians(points[f"{letter}PelvisAngles"][0])
         curves |= with_internal_moments(curves)
-    frames = points.shape[2]
-    feet = {side: (markers.get(f"{side[0].upper()}HEE"), markers.get(f"{side[0].upper()}TOE")) for side in FILE_SIDES}
-    for side, (vertical, forward) in _plate_forces(file["data"].get("platform") or [], feet, frames).items():
+    frames = max((values.shape[1] for values in points.values()), default=0)
+    feet = {side: (points.get(f"{side[0].upper()}HEE"), points.get(f"{side[0].upper()}TOE")) for side in FILE_SIDES}
+    for side, (vertical, forward) in _plate_forces(recording.plates, feet, frames).items():
         legs[side] |= {"grf_vertical": vertical, "grf_forward": forward}
-    legs = not_empty(path.name, legs)
-    complete = _frames_without_gaps(path.name, legs)
-    first = int(file["header"]["points"]["first_frame"])
+    legs = not_empty(recording.name, legs)
+    complete = _frames_without_gaps(recording.name, legs)
     return Trial(
-        name=path.name,
-        time=(first + np.arange(frames)[complete]) / rate,
+        name=recording.name,
+        time=(recording.first_frame + np.arange(frames)[complete]) / recording.rate,
         legs={side: {name: values[complete] for name, values in curves.items()} for side, curves in legs.items()},
         unscaled=FORCES,
-        contacts=_events(parameters.get("EVENT", {})),
+        contacts=recording.events,
         speed=None,
     )
 
@@ -136,13 +173,17 @@ def _refuse_broken(path: Path) -> None:
 
 
 def _events(event: Mapping[str, Any]) -> dict[str, Contacts]:
-    """Return side -> foot strikes and foot offs marked by the laboratory, for the sides with foot strikes.
-
-    `event` is the group EVENT of the file's parameters.
-    """
+    """Return side -> events in the group EVENT of a file's parameters."""
     contexts, labels = (event.get(key, {}).get("value", []) for key in ("CONTEXTS", "LABELS"))
     times = np.reshape(event.get("TIMES", {}).get("value", []), (2, -1), order="A")  # rows of minutes and of seconds
-    seconds = 60 * times[0] + times[1]
+    return contacts_of_events(contexts, labels, 60 * times[0] + times[1])
+
+
+def contacts_of_events(contexts: Sequence[str], labels: Sequence[str], seconds: NDArray) -> dict[str, Contacts]:
+    """Return side -> foot strikes and foot offs marked by the laboratory, for the sides with foot strikes.
+
+    Event k has a context (left, right), a label (Foot Strike, Foot Off) and a time [s].
+    """
     seconds_of: dict[tuple[str, str], list[float]] = {}
     for context, label, second in zip(contexts, labels, seconds, strict=False):
         seconds_of.setdefault((context.strip().lower(), label.strip().lower()), []).append(float(second))

@@ -1,8 +1,8 @@
 """Turn a user's measured walk into a `HumanGait`: a file, its strides, their mean and spread.
 
-It reads CSV in our columns or a laboratory's, OpenSim's .mot and .sto (`motion_files`), C3D (`c3d_process`) and
-Visual3D's text (`visual3d_file`). Heel strikes and toe-offs
-come from the vertical force; without it, from the events in the file; without those, from the leg's motion.
+It reads CSV in our columns or a laboratory's, OpenSim's .mot and .sto (`motion_files`), C3D (`c3d_process`), the CSV
+of Vicon Nexus (`nexus_file`) and Visual3D's text (`visual3d_file`). Heel strikes and toe-offs come from the vertical
+force; without it, from the events in the file; without those, from the leg's motion.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -18,6 +18,7 @@ from springfoot.errors import SpringfootError, as_float, perhaps, require_count,
 from springfoot.files.text_table import Table, read_csv
 
 from ..body.body import MASS_RANGE
+from .c3d_file import trial_of_recording
 from .c3d_process import c3d_trial
 from .checks import AS_IT_IS, is_mass_given, require_plausible, require_plausible_legs
 from .gait_events import CONTACT_THRESHOLD_BW, PERCENT
@@ -34,6 +35,7 @@ from .motion_files import (
     our_columns,
     refuse_impossible_angles,
 )
+from .nexus_file import is_nexus, read_nexus
 from .strides import MeasuredWalk, cut_strides, merge_trials, require_side, strides_of_legs
 from .visual3d_file import read_visual3d
 
@@ -175,6 +177,8 @@ def read_files(paths: Sequence[str | Path], columns: Mapping[str, str] = NO_NAME
     trials: list[Trial] = []
     for path in map(Path, paths):
         match path.suffix.lower():
+            case ".csv" if is_nexus(path):
+                trials.append(trial_of_recording(read_nexus(path)))
             case ".csv" | ".txt":
                 as_read = read_csv(path) if path.suffix.lower() == ".csv" else read_visual3d(path)
                 table = as_read.renamed(renamed)

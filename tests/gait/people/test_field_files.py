@@ -122,6 +122,60 @@ def plug_in_gait(folder, *, speed=1.3, kinetic=True, angle=1.0, moment=1.0, sepa
     return [path]
 
 
+def nexus(folder, *, speed=1.3, kinetic=True, plates=True, angle=1.0, moment=1.0, units=("N.mm/kg", "N")):
+    """Write the sections of a Nexus export; each foot walks on a plate of its own, sampled at 1000 Hz, along y."""
+    time, legs = walk(speed)
+    human = human_gait(speed)
+    frames = 1 + np.arange(len(time))
+    outputs, markers, devices = {}, {}, {}
+    fine = 1e-3 * (np.arange(10 * len(time)) + 5)
+    sub = np.arange(len(fine)) % 10
+    events = []
+    for side, curves, offset in zip(legs, legs.values(), (0.2, 0.7), strict=True):
+        letter = side[0].upper()
+        outputs[f"Anna:{letter}PelvisAngles"] = angle * np.degrees(curves["hip"] - curves["thigh"])
+        for joint in ("hip", "knee", "ankle"):
+            outputs[f"Anna:{letter}{joint.capitalize()}Angles"] = angle * np.degrees(curves[joint])
+            if kinetic:
+                outputs[f"Anna:{letter}{joint.capitalize()}Moment"] = 1000 * moment * curves[f"{joint}_moment"]
+        for phase, name in ((0.0, "Foot Strike"), (human.toe_off, "Foot Off")):
+            at = (np.arange(1, 6) - offset + phase) * human.stride_time
+            events += [f"Anna,{side.capitalize()},{name},{t + 0.01:.4f},words" for t in at if t < time[-1]]
+        across = 100 if side == "left" else 500
+        for marker, y in (("HEE", 100.0), ("TOE", 300.0)):
+            markers[f"Anna:{letter}{marker}"] = [across + 0 * time, y + 0 * time, 0 * time]
+        up, ahead = (MASS * GRAVITY * human.mean(name, fine / human.stride_time + offset) for name in FORCES)
+        kilo = 1e-3 if units[1] == "kN" else 1.0
+        loaded = up > 0
+        devices[f"Plate {letter} - Force"] = [0 * up, -ahead * kilo, -up * kilo]
+        devices[f"Plate {letter} - CoP"] = [across * loaded, 200 * loaded, 0 * up]
+    outputs = {name: [values, 0 * time, 0 * time] for name, values in outputs.items()}
+
+    def unit_of(name):
+        return "deg" if "Angle" in name else units[0] if "Moment" in name else units[1] if "Force" in name else "mm"
+
+    def section(name, rate, frames, subs, columns, axes):
+        lines = [name, str(rate), ",,".join(["", *(f"{key}," for key in columns)])]
+        lines += [
+            ",".join(["Frame", "Sub Frame", *axes]),
+            ",".join(["", "", *(unit_of(key) for key in columns for _ in range(3))]),
+        ]
+        values = zip(frames, subs, *(row for rows in columns.values() for row in rows), strict=True)
+        return [*lines, *(",".join(f"{value:.6g}" for value in row) for row in values), ""]
+
+    lines = []
+    if kinetic:
+        lines = ["Events", "100", "Subject,Context,Name,Time (s),Description", *events, ""]
+    if plates and kinetic:
+        lines += section(
+            "Devices", 1000, np.repeat(frames, 10), sub, devices, [*("Fx", "Fy", "Fz", "Cx", "Cy", "Cz")] * 2
+        )
+    lines += section("Model Outputs", 100, frames, 0 * frames, outputs, ["X", "Y", "Z"] * len(outputs))
+    lines += section("Trajectories", 100, frames, 0 * frames, markers, ["X", "Y", "Z"] * len(markers))
+    (folder / "Walk01.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return [folder / "Walk01.csv"]
+
+
 SPEEDS = (0.9, 1.3, 1.7)
 RIGHT = {
     **{f"{form} at {v}": (opensim, form, {"speed": v}) for form in FORCE_NAMES for v in SPEEDS},
@@ -141,6 +195,10 @@ RIGHT = {
     "Plug-in Gait, external moments": (plug_in_gait, None, {"moment": -1.0}),
     "Plug-in Gait, semicolons and decimal commas": (plug_in_gait, None, {"separator": ";"}),
     "Plug-in Gait, tabs": (plug_in_gait, None, {"separator": "\t"}),
+    **{f"Nexus at {v}": (nexus, None, {"speed": v}) for v in SPEEDS},
+    "Nexus, angles alone": (nexus, None, {"kinetic": False}),
+    "Nexus without plates": (nexus, None, {"plates": False}),
+    "Nexus in N m and kN": (nexus, None, {"moment": 1e-3, "units": ("N.m/kg", "kN")}),
 }
 
 
@@ -199,6 +257,7 @@ WRONG = {
     "Visual3D: radians": (visual3d, None, {"angle": np.pi / 180}, "radians?"),
     "Visual3D: moments in N m": (visual3d, None, {"moment": MASS}, "N m, not per kg?"),
     "Visual3D: mean curves in radians": (visual3d, None, {"angle": np.pi / 180, "rows": 101}, "radians?"),
+    "Nexus: radians": (nexus, None, {"angle": np.pi / 180}, "radians?"),
     "Plug-in Gait: radians": (plug_in_gait, None, {"angle": np.pi / 180}, "radians?"),
     "Plug-in Gait: moments in N mm": (plug_in_gait, None, {"moment": MASS}, "N m, not per kg?"),
 }
@@ -240,6 +299,32 @@ def test_a_column_is_named_as_the_user_named_it(tmp_path):
     files[2].write_text(files[2].read_text().replace("ankle_angle_r_moment", "Ankle R"))
     with pytest.raises(SpringfootError, match=r"the right leg: Ankle R goes from .* N m/kg where N m must be\?"):
         read_person(files, columns={"ankle_angle_r_moment": "Ankle R"})
+
+
+def test_plates_of_nexus_weigh_the_body_and_its_events_mark_the_strides_without_them(tmp_path):
+    weighed = read_person(nexus(tmp_path))
+    assert weighed.mass == pytest.approx(MASS, rel=0.06) and weighed.mass_from.startswith("from the forces")
+    marked = read_person(nexus(tmp_path, plates=False))
+    assert marked.mass is None
+    for side in ("left", "right"):
+        np.testing.assert_allclose(marked.legs[side].times[:, [0, 2]], weighed.legs[side].times[:, [0, 2]], atol=0.02)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("\nModel Outputs\n100\n", "\nModel Outputs\n0\n", "column rate: must be above 0, got 0"),
+        ("Frame,Sub Frame,X", "Time,Sub Frame,X", "must begin with Frame,Sub Frame"),
+        ("\n7,0,", "\n9,0,", "column Frame: 8 must be greater than 9 in the row before"),
+        (",Context,", ",Side,", "no column Context in the events"),
+        ("LKneeAngles", "LHipAngles", "column LHipAngles X stands twice"),
+    ],
+)
+def test_a_damaged_export_of_nexus_is_refused_by_line(old, new, words, tmp_path):
+    path = nexus(tmp_path, plates=False)[0]
+    path.write_text(path.read_text().replace(old, new))
+    with pytest.raises(SpringfootError, match=words):
+        read_person([path])
 
 
 def test_there_are_as_many_right_and_wrong_files_as_were_asked_for():
