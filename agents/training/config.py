@@ -293,10 +293,8 @@ def config_from_json(values: dict[str, Any]) -> TrainingConfig:
 
 
 def require_of_rllib(config: TrainingConfig) -> None:
-    """Raise `SpringfootError` for settings that the engine RLlib does not support: a mirrored network, a GPU, and steps
-    of the critic alone."""
-    if config.mirrored:
-        raise SpringfootError("--engine rllib trains no mirrored network: give --mirrored False, or another engine")
+    """Raise `SpringfootError` for settings that the engine RLlib does not support: a GPU, and steps of the critic
+    alone."""
     if config.device != "cpu":
         raise SpringfootError(f"--engine rllib learns on the CPU; drop --device {config.device}, or --engine")
     if config.critic_steps:

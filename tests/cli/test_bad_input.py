@@ -225,7 +225,6 @@ COMMANDS = [
     (["train", "--out", "x", "--threads", "99999999999"], 'springfoot train: error: threads must be a whole number >= 0 and <= 1024, got 99999999999'),
     (["train", "--out", "x", "--hidden", str(10**12)], 'springfoot train: error: hidden must be at most 32 layers of at most 8192 units, got (1000000000000,)'),
     (["train", "--out", "x", "--seeds", str(10**20)], 'springfoot train: error: seeds must be a whole number >= 1 and <= 1000000000000, got 100000000000000000000'),
-    (["train", "--out", "x", "--mirrored", "--engine", "rllib"], 'springfoot train: error: --engine rllib trains no mirrored network: give --mirrored False, or another engine'),
     (["train"], 'springfoot train: error: give either --out NEW_FOLDER or --resume FOLDER'),
     (["study", "bodies", "schedule", "--pairs", str(10**20)], 'springfoot study bodies: error: pairs must be a whole number >= 1 and <= 1000000000000, got 100000000000000000000'),
     (["study", "compare", "schedule", "--threads", "99999999999"], 'springfoot study compare: error: threads must be a whole number >= 1 and <= 1024, got 99999999999'),

@@ -1,7 +1,8 @@
 """Define actor and critic for RLlib, with the layers and initial weights of stable-baselines3's.
 
 Observations are normalised inside by statistics that stay as they are: RLlib's own filter merges the counts of its
-runners anew after every update, so that they grow without bound.
+runners anew after every update, so that they grow without bound. With a mirror one network serves both legs, as in
+`springfoot.agents.training.mirrored_network`.
 """
 
 from itertools import pairwise
@@ -25,8 +26,9 @@ _HIDDEN_GAIN, _ACTION_GAIN, _VALUE_GAIN = 2**0.5, 0.01, 1.0
 class ActorCritic(TorchRLModule, ValueFunctionAPI):
     """Two tanh networks on normalised observations: mean actions with a common log standard deviation, and the value.
 
-    `model_config` holds `hidden` (widths of the hidden layers), `log_std` (of the actions, at the start), and `mean`
-    and `variance` (D,) of the observations.
+    `model_config` holds `hidden` (widths of the hidden layers), `log_std` (of the actions, at the start), `mean` and
+    `variance` (D,) of the observations, and for a mirrored network `mirror`: `index`, `sign` (D,) and `legs_order` (A,)
+    of a `Mirror`.
     """
 
     def setup(self) -> None:
@@ -36,6 +38,13 @@ class ActorCritic(TorchRLModule, ValueFunctionAPI):
         actions = int(np.prod(self.action_space.shape))
         self.register_buffer("mean", torch.tensor(config["mean"], dtype=torch.float32))
         self.register_buffer("variance", torch.tensor(config["variance"], dtype=torch.float32))
+        mirror = config.get("mirror")
+        self.is_mirrored = mirror is not None
+        if mirror is not None:
+            actions //= 2  # those of the left leg
+            self.register_buffer("index", torch.tensor(mirror["index"]), persistent=False)
+            self.register_buffer("sign", torch.tensor(mirror["sign"], dtype=torch.float32), persistent=False)
+            self.register_buffer("legs_order", torch.tensor(mirror["legs_order"]), persistent=False)
         self.actor = _network([observations, *config["hidden"], actions], _ACTION_GAIN)
         self.critic = _network([observations, *config["hidden"], 1], _VALUE_GAIN)
         self.log_std = nn.Parameter(torch.full((actions,), float(config["log_std"])))
@@ -43,17 +52,25 @@ class ActorCritic(TorchRLModule, ValueFunctionAPI):
     def _forward(self, batch: dict[str, Any], **_: Any) -> dict[str, Any]:
         """Return the inputs of the distribution of A actions, (N, 2 A): A means, then A log standard deviations."""
         mean = self.actor(self._normalized_observations(batch))
-        return {Columns.ACTION_DIST_INPUTS: torch.cat([mean, self.log_std.expand_as(mean)], dim=-1)}
+        log_std = self.log_std
+        if self.is_mirrored:  # (N, 2, A / 2): both legs' actions
+            mean = mean.flatten(-2)[..., self.legs_order]
+            log_std = log_std.repeat(2)[self.legs_order]
+        return {Columns.ACTION_DIST_INPUTS: torch.cat([mean, log_std.expand_as(mean)], dim=-1)}
 
     def compute_values(self, batch: dict[str, Any], embeddings: Any = None) -> torch.Tensor:
         """Return the critic's values (N,) of the observations of a batch."""
-        return self.critic(self._normalized_observations(batch)).squeeze(-1)
+        values = self.critic(self._normalized_observations(batch)).squeeze(-1)
+        return values.sum(-1) if self.is_mirrored else values
 
     def _normalized_observations(self, batch: dict[str, Any]) -> torch.Tensor:
         """Return the observations (N, D) of a batch less `mean`, over the root of `variance`, clipped to
-        ±`OBSERVATION_CLIP`."""
+        ±`OBSERVATION_CLIP`; with a mirror each beside its image, (N, 2, D)."""
         centred = (batch[Columns.OBS] - self.mean) / torch.sqrt(self.variance + VARIANCE_FLOOR)
-        return centred.clamp(-OBSERVATION_CLIP, OBSERVATION_CLIP)
+        normalized = centred.clamp(-OBSERVATION_CLIP, OBSERVATION_CLIP)
+        return (
+            torch.stack((normalized, normalized[..., self.index] * self.sign), -2) if self.is_mirrored else normalized
+        )
 
 
 def _network(widths: list[int], gain: float) -> nn.Sequential:

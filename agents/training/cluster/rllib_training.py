@@ -31,6 +31,7 @@ from springfoot.arrays import NDArray
 from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.physics.timing import ACTION_STEP
 from springfoot.envs.settings.settings import settings_to_json
+from springfoot.envs.task.mirror import Mirror, mirror_of
 from springfoot.envs.vector_env import SegmentedFootBipedVector
 from springfoot.errors import SpringfootError, require_count
 from springfoot.files.json_file import object_with_digest, read_object
@@ -39,6 +40,7 @@ from springfoot.files.provenance import versions_and_commit
 from springfoot.files.writing import remove_temporary, require_new, write_atomically
 
 from ..config import TrainingConfig, config_from_json, config_to_json, processors, require_of_rllib
+from ..mirrored_network import MirroredMeanStd
 from ..progress import Progress
 from ..returns import evaluation_of
 from ..run_record import RLLIB, best_of, is_of_rllib, read_record, require_past, write_record
@@ -161,6 +163,8 @@ class _Run:
         threads = config.threads or processors()
         self._evaluation = Biped(config.environment, config.eval_episodes, threads)  # first: raises for bad settings
         self._fingerprint = fingerprint(self._evaluation)
+        names = self._evaluation.observation_names, self._evaluation.action_names
+        self._mirror = mirror_of(*names) if config.mirrored else None
         self._config = config
         self._out = out
         self._checkpoint = checkpoint
@@ -228,13 +232,15 @@ class _Run:
         gamma = config.gamma**steps_of_20ms
         rollout_steps = max(1, config.update_steps // config.num_envs)
         samples = rollout_steps * config.num_envs
-        mean, variance = observation_moments(config)
-        network = {
+        mean, variance = observation_moments(config, self._mirror)
+        network: dict[str, Any] = {
             "hidden": list(config.hidden),
             "log_std": config.log_std,
             "mean": mean.tolist(),
             "variance": variance.tolist(),
         }
+        if self._mirror is not None:
+            network["mirror"] = {name: getattr(self._mirror, name).tolist() for name in ("index", "sign", "legs_order")}
         rate = config.learning_rate
         ppo = (
             PPOConfig()
@@ -323,6 +329,7 @@ class _Run:
                 observation_mean=np.array(state["mean"], float),
                 observation_variance=np.array(state["variance"], float),
                 observation_clip=OBSERVATION_CLIP,
+                mirror=self._mirror,
             )
         )
 
@@ -380,11 +387,11 @@ class _Run:
         write_record(self._out, self._record)
 
 
-def observation_moments(config: TrainingConfig) -> tuple[NDArray, NDArray]:
+def observation_moments(config: TrainingConfig, mirror: Mirror | None = None) -> tuple[NDArray, NDArray]:
     """Return mean and variance (D,) of the observations, from one update's steps with random actions around 0.
 
     The whole training normalises by them: statistics that moved would have to be the same on every runner at every
-    step.
+    step. With a `mirror` they are of the observations and their images.
     """
     environments = SegmentedFootBipedVector(config.num_envs, **dict[str, Any](settings_to_json(config.environment)))
     random = np.random.default_rng([config.seed, 1])
@@ -396,4 +403,8 @@ def observation_moments(config: TrainingConfig) -> tuple[NDArray, NDArray]:
         batches.append(observation.astype(float))
     environments.close()
     observations = np.concatenate(batches)
+    if mirror is not None:
+        both = MirroredMeanStd(mirror)
+        both.update(observations)
+        return both.mean, both.var
     return observations.mean(axis=0), observations.var(axis=0)

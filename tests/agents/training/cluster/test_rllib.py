@@ -21,6 +21,7 @@ from springfoot.agents.training.run_record import is_of_rllib, read_record
 from springfoot.cli.train import train_main
 from springfoot.envs import Biped
 from springfoot.envs.settings.settings import BipedSettings
+from springfoot.envs.task.mirror import mirror_of
 from springfoot.envs.vector_env import SegmentedFootBipedVector
 from springfoot.errors import SpringfootError
 
@@ -85,6 +86,42 @@ def test_the_first_policy_is_the_mean_action_of_the_untrained_network(tmp_path):
         hidden = hidden if index == len(layers) - 1 else np.tanh(hidden)
     assert theirs[:, :4].numpy() == pytest.approx(hidden, abs=1e-5)
     assert theirs[:, 4:].numpy() == pytest.approx(-0.9)
+
+
+def test_a_mirrored_network_acts_and_values_alike_on_both_sides(tmp_path):
+    """The image of an observation has the image of the actions and the same value; the policy's file mirrors, too."""
+    import torch
+    from ray.rllib.core.columns import Columns  # pyright: ignore[reportMissingImports]
+
+    from springfoot.agents.training.cluster.rllib_network import ActorCritic
+
+    config = dataclasses.replace(SMALL, mirrored=True, timesteps=1024, eval_interval=1024)
+    record = rllib_training.train(config, tmp_path / "run", num_env_runners=0)
+    assert record["status"] == "finished"
+    policy = load_policy(tmp_path / "run" / "last.safetensors")
+    environments = SegmentedFootBipedVector(4)
+    mirror = mirror_of(environments.biped.observation_names, environments.biped.action_names)
+    assert policy.mirror is not None and policy.weights[-1].shape[0] == 2  # actions of the left leg
+    rows = environments.reset(seed=3)[0]
+    np.testing.assert_array_equal(policy(mirror.of(rows)), policy(rows)[:, mirror.action_index])
+    mean, variance = rllib_training.observation_moments(config, mirror)
+    np.testing.assert_array_equal(mirror.of(mean), mean)
+    module = ActorCritic(
+        observation_space=environments.single_observation_space,
+        action_space=environments.single_action_space,
+        model_config={
+            "hidden": [8, 8],
+            "log_std": -0.9,
+            "mean": mean.tolist(),
+            "variance": variance.tolist(),
+            "mirror": {name: getattr(mirror, name).tolist() for name in ("index", "sign", "legs_order")},
+        },
+    )
+    with torch.no_grad():
+        rows, images = ({Columns.OBS: torch.from_numpy(values)} for values in (rows, mirror.of(rows)))
+        given, mirrored = (module.forward_inference(batch)[Columns.ACTION_DIST_INPUTS] for batch in (rows, images))
+        torch.testing.assert_close(mirrored[:, mirror.action_index], given[:, :4])
+        torch.testing.assert_close(module.compute_values(images), module.compute_values(rows))
 
 
 def test_two_nodes_learn_as_much_as_our_own_trainer_of_as_many_samples(cluster, tmp_path):
