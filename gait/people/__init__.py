@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from .human import COLUMNS, STEP_TIME_RATIO_RANGE, HumanGait, human_gait
     from .measured_person import PARTLY, MeasuredPerson, read_person
     from .motion_files import FILE_CURVES
-    from .own_data import read_gait
+    from .own_data import TOE_OFF_COLUMN, read_gait
     from .scores import (
         LOADING_END_PERCENT,
         PUSH_OFF_BEGIN_PERCENT,
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
         rmse,
         stride_work,
     )
-    from .strides import FILTER
+    from .strides import FILTER, FINE_PERCENT
 
 __all__ = [
     "AS_IT_IS",
@@ -30,11 +30,13 @@ __all__ = [
     "CONTACT_THRESHOLD_BW",
     "FILE_CURVES",
     "FILTER",
+    "FINE_PERCENT",
     "LOADING_END_PERCENT",
     "PARTLY",
     "PERCENT",
     "PUSH_OFF_BEGIN_PERCENT",
     "STEP_TIME_RATIO_RANGE",
+    "TOE_OFF_COLUMN",
     "Contacts",
     "HumanGait",
     "MeasuredPerson",
@@ -59,6 +61,8 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
             "AS_IT_IS": "checks",
             "COLUMNS": "human",
             "FILTER": "strides",
+            "FINE_PERCENT": "strides",
+            "TOE_OFF_COLUMN": "own_data",
             "FILE_CURVES": "motion_files",
             "MeasuredPerson": "measured_person",
             "PARTLY": "measured_person",

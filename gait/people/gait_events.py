@@ -98,12 +98,14 @@ def sample(series: NDArray, times: NDArray, tick: float, first: float = 0.0) -> 
     return series[before] * (1 - fraction) + series[after] * fraction
 
 
-def on_percent(series: NDArray, begin: NDArray, end: NDArray, tick: float, first: float = 0.0) -> NDArray:
-    """Return curves (S, 101, ...) of `series` (T, ...) over percent 0..100 of S intervals.
+def on_percent(
+    series: NDArray, begin: NDArray, end: NDArray, tick: float, first: float = 0.0, percent: NDArray = PERCENT
+) -> NDArray:
+    """Return curves (S, P, ...) of `series` (T, ...) over `percent` (P,) of S intervals.
 
     They last from `begin` (S,) to `end` (S,) [s]; `tick` and `first` as in `sample`.
     """
-    times = begin[:, None] + (end - begin)[:, None] * (PERCENT / 100)
+    times = begin[:, None] + (end - begin)[:, None] * (percent / 100)
     return sample(series, times, tick, first)
 
 

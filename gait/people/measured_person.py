@@ -14,7 +14,7 @@ from ..body.body import GRAVITY, MASS_RANGE
 from .checks import AS_IT_IS
 from .gait_events import PERCENT, WARM_UP
 from .human import COLUMNS
-from .motion_files import NO_NAMES
+from .motion_files import FILE_SIDES, NO_NAMES
 from .own_data import (
     ACCEPTED,
     OwnGait,
@@ -24,15 +24,25 @@ from .own_data import (
     people_at,
     percent_curves,
     read_files,
+    toe_off_of,
 )
 from .scores import LOADING_END_PERCENT
-from .strides import LegStrides, MeasuredWalk, borne_mass, force_delay, strides_of_legs
+from .strides import (
+    EVENTS,
+    TORQUE_ANGLE_CURVES,
+    LegStrides,
+    MeasuredWalk,
+    borne_mass,
+    force_delay,
+    strides_of_legs,
+)
 
 MASSES_APART = 1.1
 """Largest factor between the body mass of the caller and that which the forces bear that gets no note; chosen."""
-CLOCKS_APART = 0.06
-"""Largest time between forces and motion that gets no note [s]; chosen. Right files have 0.03 s at most: people
-at 0.85 to 1.9 m/s, and walks here on sound, weak, passive, rigid and dropping feet."""
+CLOCKS_APART = 0.055
+"""Largest time between forces and motion (`force_delay`), or between ankle moment and force, that gets no note [s];
+chosen. Right files have 0.027 and 0.031 s at most: people at 0.85 to 1.9 m/s, and walks here on sound, weak, passive
+and rigid feet."""
 PARTLY = (
     "a foot was partly off its plate, as its force ends before the foot leaves the ground, does not reach 0.9 body "
     "weights, or both feet together do not bear the body in a step"
@@ -52,6 +62,17 @@ LONG_WALK = 10.0
 """Time from which the first `WARM_UP` of a walk does not count [s]; chosen. A simulation begins in a state that is not
 yet its gait, and of a laboratory's treadmill these are 3 of ten strides or more, whose belt may still speed up; walks
 over ground, which begin before the cameras see them, are shorter."""
+
+LATE_STANCE, MID_STANCE = (0.7, 1.0), (0.25, 0.6)
+"""Parts of stance after heel-off, and with a flat foot; chosen."""
+LEAST_TOE_TURN, LEAST_TOE_RISE = np.radians(10.0), 0.2
+"""Excursion of a toe over the stride below which its shape is not looked at [rad], and least rise after heel-off over
+the excursion [-]; chosen. Toes here rise by 0.67 and more."""
+LEAST_TOE_SHARE = 0.01
+"""Least moment of a toe over the ankle's [-]; chosen. Toes here have 0.08 and more, one in N m/kg where N m must be
+0.003."""
+STRIKES_APART = 0.15
+"""Least time between strikes of the two feet over that of a stride [-]; chosen. Walks have 0.4 to 0.5."""
 
 COARSE = (
     "interpolated by cubic splines; in short phases of stance, such as controlled plantarflexion, quasi-stiffness may "
@@ -77,11 +98,8 @@ class MeasuredPerson:
     """Sentences on guesses and omissions."""
 
     def toe_off(self, side: str) -> float | None:
-        """Return the mean phase of toe-off of a leg, 0..1; for mean curves that of the file, None if it has none."""
-        leg = self.legs[side]
-        if not len(leg.times):
-            return self.gait.toe_off
-        return float(np.mean(leg.toe_off_phase))
+        """Return the mean phase of toe-off of a leg, 0..1; None for mean curves of a file that does not tell it."""
+        return _toe_off(self.legs[side])
 
 
 def read_person(
@@ -120,7 +138,9 @@ def read_person(
             leg: LegStrides(
                 times=np.empty((0, 3)),
                 curves={name: values[None] for name, values in curves.items()},
+                fine={name: curves[name][None] for name in TORQUE_ANGLE_CURVES if name in curves},
                 weighed=np.ones(1, bool),
+                toe_off=toe_off_of(table, leg, curves),
             )
             for leg, curves in percent_curves(table).items()
             if side == "both" or leg in (side, "")
@@ -158,12 +178,20 @@ def read_person(
                 f"The forces are {abs(delay):.2f} s {late} than the legs' motion: do the files have one clock? "
                 "Stiffness needs moment and angle of one time."
             )
+        notes += _notes_on_moments(legs)
+        if any(leg.events == EVENTS[-1] for leg in legs.values()):
+            notes.append(
+                f"Heel strikes and toe-offs are by {EVENTS[-1]}, a few percent of the stride off: in walks here "
+                "quasi-stiffness next to them was up to a half off, and a few percent elsewhere."
+            )
         if any(name.endswith("_moment") for _, name in walk.unscaled) and mass is None and borne is None:
             notes.append("Moments left out: they are in N m, and without forces only --mass tells the body mass.")
             notes += _doubtful_moments(walk)
     if speed is not None:
         gait = replace(gait, speed=speed)
-    _require_small_toe_moment(gait.name, legs, trust_units)
+    if not trust_units:
+        _require_toe(gait.name, legs, people_at(gait.speed).toe_off)
+        _require_two_legs(gait.name, legs)
     mass_from = "as given" if mass is not None else "from the forces over whole strides"
     if mass is not None and borne is not None and not 1 / MASSES_APART < borne / mass < MASSES_APART:
         notes.append(f"The forces bear {borne:.3g} kg, not {mass:g}.")
@@ -187,11 +215,44 @@ def _notes_on_plates(walk: MeasuredWalk, legs: Mapping[str, LegStrides]) -> list
     if slow := {side: rise for side, rise in rises.items() if rise < SLOW_RISE}:
         words = " and ".join(f"{100 * rise:.0f} % {side}".strip() for side, rise in slow.items())
         notes.append(
-            f"The vertical force rises at heel strike at {words} of people's rate: was it smoothed? In a walk here "
+            f"The vertical force rises at heel strike at {words} of people's rate: was it smoothed, or is a part "
+            "missing? In a walk here "
             "a low-pass at 6 Hz made quasi-stiffness a third to a half too low in the first 6 % of the stride, and a "
             "fifth too high in late mid-stance."
         )
     return notes
+
+
+def _notes_on_moments(legs: Mapping[str, LegStrides]) -> list[str]:
+    """Return a sentence on ankle moments of another clock than their forces, for each leg with one.
+
+    In push-off the force stays at the ball of the foot, so that moment and force fall to their halves together.
+    """
+    notes = []
+    for side, leg in legs.items():
+        if not {"ankle_moment", "grf_vertical"} <= leg.curves.keys() or not leg.weighed.any():
+            continue
+        moment, force = (leg.counted(name).mean(axis=0) for name in ("ankle_moment", "grf_vertical"))
+        top = int(moment.argmax())
+        halves = [_half_after(curve, top) for curve in (moment, force)]
+        stride = float(np.mean(leg.times[:, 2] - leg.times[:, 0]))
+        delay = stride * (halves[0] - halves[1]) / 100
+        if abs(delay) > CLOCKS_APART:
+            late = "later" if delay > 0 else "earlier"
+            notes.append(
+                f"The {side} ankle's moment falls {abs(delay):.2f} s {late} than its force: "
+                "do the files have one clock?"
+            )
+    return notes
+
+
+def _half_after(curve: NDArray, top: int) -> float:
+    """Return the percent of the stride at which a curve (101,) has fallen to half of its value at percent `top`."""
+    below = np.flatnonzero(curve[top:] < 0.5 * curve[top])
+    if not len(below):
+        return float(len(curve) - 1)
+    after = top + int(below[0])
+    return after - 1 + float((curve[after - 1] - 0.5 * curve[top]) / (curve[after - 1] - curve[after]))
 
 
 def _rise(vertical: NDArray) -> float:
@@ -223,14 +284,58 @@ def _doubtful_moments(walk: MeasuredWalk) -> list[str]:
     return [f"The largest of {_columns_of(walk, 'ankle_moment')} is {max(peaks):.2g}, too little for N m: in N m/kg?"]
 
 
-def _require_small_toe_moment(name: str, legs: Mapping[str, LegStrides], trust_units: bool) -> None:
-    """Raise `SpringfootError` for a toe's moment larger than the ankle's, whose lever is longer."""
+def _toe_off(leg: LegStrides) -> float | None:
+    """Return the mean phase of toe-off of a leg, 0..1; None for mean curves of a file that does not tell it."""
+    return float(np.mean(leg.toe_off_phase)) if len(leg.times) else leg.toe_off
+
+
+def _require_toe(name: str, legs: Mapping[str, LegStrides], usual_toe_off: float) -> None:
+    """Raise `SpringfootError` for a toe that moves as none does: another foot's, of the wrong sign, or in another unit.
+
+    The toe turns up after heel-off, and its moment, plantarflexion positive, is largest then and smaller than the
+    ankle's, whose lever is longer. `usual_toe_off` is the phase of toe-off of legs that do not tell their own.
+    """
     for side, leg in legs.items():
-        if trust_units or not {"toe_moment", "ankle_moment"} <= leg.curves.keys() or not leg.weighed.any():
+        where = f"{name}, the {side or 'one'} leg"
+        toe_off = _toe_off(leg) or usual_toe_off
+        late, middle = (
+            slice(*(np.array(part) * 100 * toe_off).round().astype(int)) for part in (LATE_STANCE, MID_STANCE)
+        )
+        if "toe" in leg.curves:
+            toe = leg.curves["toe"].mean(axis=0)
+            if np.ptp(toe) > LEAST_TOE_TURN and toe[late].max() - toe[middle].mean() < LEAST_TOE_RISE * np.ptp(toe):
+                raise SpringfootError(
+                    f"{where}: the toe does not turn up after heel-off: of the other foot, or is toe up not positive? "
+                    f"{AS_IT_IS}"
+                )
+        if not {"toe_moment", "ankle_moment"} <= leg.curves.keys() or not leg.weighed.any():
             continue
-        toe, ankle = (np.abs(leg.counted(curve).mean(axis=0)).max() for curve in ("toe_moment", "ankle_moment"))
-        if toe > ankle:
+        toe, ankle = (leg.counted(curve).mean(axis=0) for curve in ("toe_moment", "ankle_moment"))
+        largest = int(np.abs(toe).argmax())
+        share = abs(toe[largest]) / np.abs(ankle).max()
+        if not LEAST_TOE_SHARE <= share <= 1.0:
             raise SpringfootError(
-                f"{name}, the {side or 'one'} leg: the toe's moment reaches {toe:.3g} N m/kg, the ankle's {ankle:.3g}: "
-                f"another unit? {AS_IT_IS}"
+                f"{where}: the toe's moment reaches {abs(toe[largest]):.3g} N m/kg, the ankle's "
+                f"{np.abs(ankle).max():.3g}: another unit? {AS_IT_IS}"
             )
+        if toe[largest] < 0:
+            raise SpringfootError(
+                f"{where}: the toe's moment is largest below 0: plantarflexion must be positive; {AS_IT_IS}"
+            )
+        if not 0.5 * toe_off <= largest / 100 <= toe_off + 0.05:
+            raise SpringfootError(
+                f"{where}: the toe's moment is largest at {largest} % of the stride, not in the second half of stance: "
+                f"of the other foot? {AS_IT_IS}"
+            )
+
+
+def _require_two_legs(name: str, legs: Mapping[str, LegStrides]) -> None:
+    """Raise `SpringfootError` if both feet strike at once, as of a leg that is a copy of the other."""
+    if set(legs) != set(FILE_SIDES) or any(not len(leg.times) for leg in legs.values()):
+        return
+    left, right = (legs[side].times[:, 0] for side in FILE_SIDES)
+    stride = float(np.median(legs["left"].times[:, 2] - left))
+    # Time since the other foot's nearest strike, at most half a stride.
+    apart = np.abs(left[:, None] - right).min(axis=1)
+    if np.median(apart) < STRIKES_APART * stride:
+        raise SpringfootError(f"{name}: both feet strike at once: is one leg a copy of the other? {AS_IT_IS}")

@@ -139,7 +139,7 @@ def known_columns() -> set[str]:
     known |= {
         f"{column}{side}{sd}" for column in (*FILE_CURVES.values(), PELVIS) for side in sides for sd in ("", "_sd")
     }
-    known |= {"pelvis_tilt", "pelvis_tx"}
+    known |= {"pelvis_tilt", "pelvis_tx", *(f"toe_off_percent_{side}" for side in FILE_SIDES)}
     known |= {f"{coordinate}_{side}{end}" for coordinate in _OPENSIM for side in "lr" for end in ("", "_moment")}
     return known | {f"{start}{axis}" for starts in _OPENSIM_FORCE.values() for start in starts for axis in "xy"}
 
@@ -185,12 +185,15 @@ def opensim_trial(path: Path, renamed: Mapping[str, str] = NO_NAMES) -> Trial:
         if "hip" in curves and tilt is not None:
             curves["thigh"] = curves["hip"] + tilt
             column_of[side, "thigh"] = f"{column_of[side, 'hip']} + pelvis_tilt"
-    notes = ()
+    notes: tuple[str, ...] = ()
+    rows = next((int(m[1]) for line in header if (m := re.match(r"\s*(?:nRows\s*=|datarows)\s*(\d+)", line))), None)
+    if rows is not None and rows != len(table.rows):
+        notes = (f"{path.name} says that it has {rows} rows, and has {len(table.rows)}: was it cut short?",)
     if any(legs.values()) and not in_degrees:
         widest = max(float(np.ptp(values)) for curves in legs.values() for values in curves.values())
         in_degrees = "yes" if widest > MOST_RADIANS else "no"
         unit_name = "degrees" if in_degrees == "yes" else "radians"
-        notes = (
+        notes += (
             f"{path.name} does not say inDegrees: its angles span {widest:.3g}, so they are taken as {unit_name}.",
         )
     if any(legs.values()) and in_degrees not in ("yes", "no"):

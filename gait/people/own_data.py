@@ -53,6 +53,8 @@ MISTAKEN_PARAMETERS = {
     "toe_off": {"in percent": 1e2, "a fraction, where percent must be": 1e-2},
 }
 """Parameter -> mistaken unit -> the factor by which it makes the parameter larger."""
+TOE_OFF_COLUMN = "toe_off_percent"
+"""Column of the phase of toe-off of mean curves [%]; of one leg with `_left` or `_right` behind."""
 COMFORTABLE_SPEED = 1.2
 """Speed of the people to compare curves of unknown speed with [m/s]; chosen."""
 SPEEDS_APART = 1.4
@@ -223,6 +225,22 @@ def percent_curves(table: Table, end: str = "") -> dict[str, Series]:
     return {side: curves for side, curves in legs.items() if curves}
 
 
+def toe_off_of(table: Table, side: str, curves: Series) -> float | None:
+    """Return the phase of toe-off, 0..1, of a leg with mean `curves` (101,); None if the table does not tell it.
+
+    `side` is left, right or "". The column of that leg goes before the leg's vertical force, and that before the column
+    of both legs.
+    """
+    own = f"{TOE_OFF_COLUMN}_{side}" if side else TOE_OFF_COLUMN
+    if table.has(own):
+        return float(table.numbers(own)[0]) / 100
+    if "grf_vertical" in curves and (loaded := np.flatnonzero(curves["grf_vertical"] > CONTACT_THRESHOLD_BW)).size:
+        last = min(int(loaded[-1]), len(PERCENT) - 2)
+        before, after = curves["grf_vertical"][last : last + 2]
+        return (last + float((before - CONTACT_THRESHOLD_BW) / (before - after))) / 100 if after < before else 1.0
+    return float(table.numbers(TOE_OFF_COLUMN)[0]) / 100 if table.has(TOE_OFF_COLUMN) else None
+
+
 def _require_side(side: str) -> None:
     """Raise `SpringfootError` unless `side` is both, left or right."""
     if side not in ("both", *FILE_SIDES):
@@ -261,10 +279,11 @@ def gait_of_percents(table: Table, side: str, trust_units: bool) -> OwnGait:
     def parameter(column: str) -> float | None:
         return float(table.numbers(column)[0]) if table.has(column) else None
 
-    toe_off = parameter("toe_off_percent")
-    if toe_off is None and "grf_vertical" in mean:
-        # The percent after the last one under load.
-        toe_off = float(PERCENT[mean["grf_vertical"] > CONTACT_THRESHOLD_BW].max(initial=0)) + 1
+    toe_off = parameter(TOE_OFF_COLUMN)
+    if toe_off is None:
+        offs = [toe_off_of(table, leg, curves) for leg, curves in legs.items() if leg in ("", *chosen)]
+        known = [off for off in offs if off is not None]
+        toe_off = 100 * float(np.mean(known)) if known else None
     strides = parameter("n")
     if strides is not None and strides % 1:
         raise SpringfootError(f"{table.name}: n must be a whole number of strides, got {strides:g}")

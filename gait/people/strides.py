@@ -17,6 +17,12 @@ from .gait_events import CONTACT_THRESHOLD_BW, Contacts, find_contacts, next_aft
 from .human import COLUMNS, FORCES
 from .motion_files import FILE_SIDES, PARAMETERS, TIME_COLUMNS, Series, Trial, refuse_impossible_angles
 
+FINE_PERCENT = np.linspace(0.0, 100.0, 1001)
+"""Percents of the stride at which torque-angle curves are read; chosen: phases of stance begin between whole percents,
+and slopes of short ones differ by up to a third if they are read at these alone."""
+TORQUE_ANGLE_CURVES = ("ankle", "toe", "ankle_moment", "toe_moment")
+EVENTS = ("the vertical force", "the events of the files", "the motion of heel and toe")
+"""Methods that find heel strikes and toe-offs, in the order in which they are tried."""
 ANGLE_CURVES = ("thigh", "hip", "knee", "ankle", "toe")
 """Curves that need no force plate."""
 FEWEST_STRIDES = 2
@@ -36,6 +42,9 @@ event or a turn; chosen."""
 HEEL_STRIKE_AFTER, TOE_OFF_AFTER = 0.032, 0.006
 """Time from the farthest heel to heel strike, and from the hindmost toe to toe-off, in people's curves [strides]: 0.030
 to 0.036 and 0.004 to 0.009 at 0.85 to 1.96 m/s."""
+USUAL_DELAY = -0.02
+"""Time from toe-off by motion to toe-off by force [s]; chosen: some -0.005 in people's curves, and in walks here on
+sound, weak, passive and rigid feet -0.024 to -0.047, the mean of both legs."""
 CUTOFF = 6.0
 """Low-pass frequency of angles for events and rates [Hz]: usual for walking (Winter 2009, ch. 3)."""
 FILTER = f"second-order Butterworth low-pass at {CUTOFF:g} Hz, forward and back"
@@ -115,6 +124,13 @@ class LegStrides:
     forces."""
     partly: NDArray = field(default_factory=lambda: np.zeros(0, bool))
     """(S,) True for strides on a force plate that do not count, as a part of the force is missing."""
+    fine: Series = field(default_factory=dict)
+    """Curve of `TORQUE_ANGLE_CURVES` -> (S, 1001) over `FINE_PERCENT`, or (S, 101) of mean curves, in the units of
+    `curves`."""
+    events: str = ""
+    """Name in `EVENTS` of the method that found heel strikes and toe-offs; empty for mean curves."""
+    toe_off: float | None = None
+    """Phase of toe-off of mean curves, 0..1."""
 
     @property
     def toe_off_phase(self) -> NDArray:
@@ -238,7 +254,12 @@ def strides_of_legs(walk: MeasuredWalk, side: str = "both", mass: float | None =
     borne = borne_mass(walk) if mass is None else None
     mass = borne.mass if borne else mass
     return {
-        name: replace(leg, curves=_scaled_curves(leg.curves, name, walk.unscaled, mass)) for name, leg in legs.items()
+        name: replace(
+            leg,
+            curves=_scaled_curves(leg.curves, name, walk.unscaled, mass),
+            fine=_scaled_curves(leg.fine, name, walk.unscaled, mass),
+        )
+        for name, leg in legs.items()
     }
 
 
@@ -286,11 +307,20 @@ def _legs_by_weight(walk: MeasuredWalk, weight: float | None) -> dict[str, LegSt
     """
     legs = {}
     for name, leg in walk.legs.items():
-        times = _strides_of_leg(walk, name, weight)
+        times, events = _strides_of_leg(walk, name, weight)
         begin, _, end = times.T
         curves = {curve: on_percent(series, begin, end, walk.tick, walk.first) for curve, series in leg.items()}
         legs[name] = LegStrides(
-            times=times, curves=curves, weighed=np.full(len(begin), True), partly=np.full(len(begin), False)
+            times=times,
+            curves=curves,
+            weighed=np.full(len(begin), True),
+            partly=np.full(len(begin), False),
+            fine={
+                curve: on_percent(leg[curve], begin, end, walk.tick, walk.first, FINE_PERCENT)
+                for curve in TORQUE_ANGLE_CURVES
+                if curve in leg
+            },
+            events=events,
         )
         if "grf_vertical" in curves:
             legs[name] = replace(legs[name], weighed=_on_plate(curves["grf_vertical"], weight))
@@ -404,11 +434,9 @@ def borne_mass(walk: MeasuredWalk) -> BorneMass | None:
     return None if weight is None else BorneMass(weight / GRAVITY, weighed)
 
 
-def _strides_of_leg(walk: MeasuredWalk, side: str, weight: float | None) -> NDArray:
-    """Return (S, 3) heel strike, toe-off, next heel strike [s] of one leg, by the first method that finds enough.
-
-    Methods: the vertical force, the events in the file, the leg's motion. `weight` as in `_legs_by_weight`.
-    """
+def _strides_of_leg(walk: MeasuredWalk, side: str, weight: float | None) -> tuple[NDArray, str]:
+    """Return (S, 3) heel strike, toe-off, next heel strike [s] of one leg, by the first method that finds enough, and
+    its name in `EVENTS`. `weight` as in `_legs_by_weight`."""
     leg = walk.legs[side]
     methods: tuple[Callable[[], Contacts | None], ...] = (
         lambda: _contacts_of_force(walk, leg, weight),
@@ -416,7 +444,8 @@ def _strides_of_leg(walk: MeasuredWalk, side: str, weight: float | None) -> NDAr
         lambda: _contacts_of_motion(walk, leg),
     )
     best = np.empty((0, 3))
-    for method in methods:
+    name = EVENTS[0]
+    for method_name, method in zip(EVENTS, methods, strict=True):
         # A later method counts only if those before it found too few.
         if len(best) >= FEWEST_STRIDES or (contacts := method()) is None:
             continue
@@ -427,7 +456,8 @@ def _strides_of_leg(walk: MeasuredWalk, side: str, weight: float | None) -> NDAr
         strides = strides[np.abs(duration - usual) <= UNEVEN_STRIDE * usual]
         if len(strides) > len(best):
             best = strides
-    return best
+            name = method_name
+    return best, name
 
 
 def _contacts_of_force(walk: MeasuredWalk, leg: Series, weight: float | None) -> Contacts | None:
@@ -449,19 +479,17 @@ def _contacts_of_motion(walk: MeasuredWalk, leg: Series) -> Contacts | None:
 def force_delay(walk: MeasuredWalk, side: str = "both") -> float | None:
     """Return the time by which forces are later than the motion of the legs of `side` [s]; None without both.
 
-    Events by force less those by motion, the median over heel strikes or that over toe-offs, whichever is nearer to 0;
-    0 if they are of opposite signs, as on rigid feet: another clock moves both alike.
+    It is that of toe-offs by force less toe-offs by motion, the median of each leg, the mean of the legs: heel strikes
+    tell less, as on a stiff foot the heel is farthest ahead long before it lands.
     """
-    strikes, offs = [], []
+    delays = []
     for name, leg in walk.legs.items():
         by_force, by_motion = _contacts_of_force(walk, leg, None), _contacts_of_motion(walk, leg)
         if side in ("both", name) and by_force is not None and by_motion is not None:
-            strikes += [*_lateness(by_force.heel_strikes, by_motion.heel_strikes)]
-            offs += [*_lateness(by_force.toe_offs, by_motion.toe_offs)]
-    if not strikes or not offs:
-        return None
-    delays = (float(np.median(strikes)), float(np.median(offs)))
-    return min(delays, key=abs) if delays[0] * delays[1] > 0 else 0.0
+            late = _lateness(by_force.toe_offs, by_motion.toe_offs)
+            if min(len(late), len(by_motion.toe_offs)) > FEWEST_STRIDES:
+                delays.append(float(np.median(late)))
+    return float(np.mean(delays)) - USUAL_DELAY if delays else None
 
 
 def _lateness(times: NDArray, others: NDArray) -> NDArray:

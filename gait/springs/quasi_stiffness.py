@@ -40,7 +40,7 @@ class StancePhase(NamedTuple):
 
 
 def stance_phases(joint: str, angle: NDArray, toe_off: float) -> list[StancePhase]:
-    """Return the phases of stance of a joint, ankle or toe, from its mean angle (101,) over percent of the stride.
+    """Return the phases of stance of a joint, ankle or toe, from its mean angle (P,) over equal parts of the stride.
 
     The ankle's are those of `FUKUCHI_OVERGROUND`: they end at foot flat, half-way between it and maximum dorsiflexion,
     at maximum dorsiflexion and at toe-off. The toe's end at heel-off, at its largest angle and at toe-off. A phase that
@@ -62,14 +62,14 @@ def stance_phases(joint: str, angle: NDArray, toe_off: float) -> list[StancePhas
 def phase_slope(angle: NDArray, moment: NDArray, phase: StancePhase) -> Estimate | None:
     """Return the slope of the mean moment over the mean angle in a phase, by least squares, [N m/rad] for [N m].
 
-    `angle` [rad] and `moment` (S, 101) are curves of S strides over percent of the stride; the moment is positive
+    `angle` [rad] and `moment` (S, P) are curves of S strides over equal parts of the stride; the moment is positive
     against the angle, so that a spring's slope is positive. The interval leaves out one stride after another
     (`jackknife`); of a single stride it is infinite. None where the angle makes less than `SMALLEST_TURN`.
     """
     count = max(round((phase.end - phase.start) / SLOPE_STEP), 2) + 1
     at = np.linspace(phase.start, phase.end, count)
-    percent = np.linspace(0.0, 1.0, angle.shape[1])
-    angles, moments = (np.array([np.interp(at, percent, row) for row in rows]) for rows in (angle, moment))
+    parts = np.linspace(0.0, 1.0, angle.shape[1])
+    angles, moments = (np.array([np.interp(at, parts, row) for row in rows]) for rows in (angle, moment))
     if np.ptp(angles.mean(axis=0)) < SMALLEST_TURN:
         return None
 

@@ -6,7 +6,7 @@
 Quasi-stiffness by phase beside people's, the person's curves, and their springs as a schedule that walks here.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from itertools import pairwise
 from pathlib import Path
@@ -15,15 +15,26 @@ from typing import Annotated, Any
 import numpy as np
 import tyro
 
+from springfoot.agents.training import PRESETS
 from springfoot.arrays import NDArray
+from springfoot.envs.control import reference_walk_at, tabulated_speeds
 from springfoot.envs.physics import damping_times
 from springfoot.errors import SpringfootError
 from springfoot.evaluation.report import schedule_csv, states_json, table_of_states
 from springfoot.files.markdown import MISSING, table, text_of
 from springfoot.files.writing import csv_text
-from springfoot.gait import Body, HumanGait, human_gait, schedule_from_curves
+from springfoot.gait import GRAVITY, Body, HumanGait, human_gait, schedule_from_curves
 from springfoot.gait.body import REFERENCE_MASS, TOE_STIFFNESS
-from springfoot.gait.people import AS_IT_IS, FILE_CURVES, FILTER, PARTLY, PERCENT, MeasuredPerson
+from springfoot.gait.people import (
+    AS_IT_IS,
+    FILE_CURVES,
+    FILTER,
+    FINE_PERCENT,
+    PARTLY,
+    PERCENT,
+    TOE_OFF_COLUMN,
+    MeasuredPerson,
+)
 from springfoot.gait.springs import (
     LOWEST_STIFFNESS,
     SPRINGS,
@@ -55,6 +66,9 @@ STATE_NAMES = {
     "toe-off": "swing",
 }
 """Event at which a finite state begins -> its name."""
+HEIGHT_AROUND, MASS_AROUND, SPEED_AROUND = 0.02, 2.0, 0.15
+"""Ranges on either side of a person's height [m], mass [kg] and speed [of it] in which a learned person is taught;
+chosen: their own step at a far speed may be longer than their legs allow."""
 TAUGHT = "learned-2"
 """Learned person that `--train` begins from; chosen: it was trained by one command."""
 SPRING_EVENTS = {
@@ -151,13 +165,13 @@ class _Sheet:
             moment = f"{joint}_moment"
             for side, leg in self._measured.legs.items():
                 toe_off = self._measured.toe_off(side) or self._norm.toe_off
-                if {joint, moment} <= leg.curves.keys() and leg.weighed.any():
-                    angles, moments = (leg.curves[name][leg.weighed] for name in (joint, moment))
+                if {joint, moment} <= leg.fine.keys() and leg.weighed.any():
+                    angles, moments = (leg.fine[name][leg.weighed] for name in (joint, moment))
                     for phase in stance_phases(joint, angles.mean(axis=0), toe_off):
                         slope = phase_slope(angles, factor * moments, phase)
                         rows.append(PhaseStiffness(joint=joint, side=side or "both", phase=phase, slope=slope))
             if moment in self._norm.mean_series:
-                angle, torque = (self._norm.mean(name, PERCENT / 100)[None] for name in (joint, moment))
+                angle, torque = (self._norm.mean(name, FINE_PERCENT / 100)[None] for name in (joint, moment))
                 scale = factor * self._body.length_scale
                 for phase in stance_phases(joint, angle[0], self._norm.toe_off):
                     slope = phase_slope(angle, scale * torque, phase)
@@ -217,8 +231,11 @@ class _Sheet:
             "speed_m_s": gait.speed,
             "stride_time_s": gait.stride_time,
             "step_length_m": gait.step_length,
-            "toe_off_percent": None if gait.toe_off is None else 100 * gait.toe_off,
+            TOE_OFF_COLUMN: None if gait.toe_off is None else 100 * gait.toe_off,
         }
+        for side in filter(None, self._measured.legs):
+            toe_off = self._measured.toe_off(side)
+            numbers[f"{TOE_OFF_COLUMN}_{side}"] = None if toe_off is None else 100 * toe_off
         numbers = {name: value for name, value in numbers.items() if value is not None}
         columns: dict[str, NDArray] = {}
         phase = PERCENT / 100
@@ -326,8 +343,12 @@ class _Sheet:
         pattern = ".0f" if self._mass else ".2f"
         late = {row.side: row.slope for row in self.rows if (row.joint, row.phase.name) == ("ankle", "late rising")}
         own = [f"{slope.value:{pattern}} {side}" for side, slope in late.items() if side != "norm" and slope]
-        if not own:
+        if not any(row.side != "norm" and row.slope for row in self.rows):
             return "**No stiffness, only curves: these files give no moment of an ankle that counts.**"
+        if not own:
+            return (
+                "**The ankle hardly turns in late mid-stance, so its moment has no slope there; other phases below.**"
+            )
         norm = late.get("norm")
         beside = f"; people's norm is {norm.value:{pattern}}" if norm else ""
         words = " and ".join(own).replace(" both", "")
@@ -354,6 +375,7 @@ class _Sheet:
         without_mass = f": stiffness is per kg, the schedule of {REFERENCE_MASS:g} kg"
         lines = [
             *self._flags.readings(self._measured, self._norm, without_mass),
+            *self._load_words(),
             f"Borrowed from the norm: {borrowed or 'nothing'}.",
             f"Filter: none on the curves; {FILTER}, on angles for events and joint powers."
             if over_time
@@ -361,6 +383,31 @@ class _Sheet:
             *notes,
         ]
         return "\n".join(f"- {line}" for line in lines)
+
+    def _load_words(self) -> list[str]:
+        """Return sentences on the lever at which each foot bears the body in push-off, and on its share of the weight.
+
+        Where a plate or a moment has another scale, they are not alike left and right, or not like people's.
+        """
+        names = ("grf_vertical", "ankle_moment")
+        means = {
+            side: [leg.counted(name).mean(axis=0) for name in names]
+            for side, leg in self._measured.legs.items()
+            if all(_has_strides(leg, name) for name in names)
+        }
+        if not means:
+            return []
+        means["norm"] = [self._norm.mean(name, PERCENT / 100) for name in names]
+        levers = []
+        for side, (force, moment) in means.items():
+            top = int(moment.argmax())
+            levers.append(f"{moment[top] / (GRAVITY * force[top]):.3f} m {side}".rstrip())
+        lines = [f"Lever of the vertical force about the ankle, where its moment is largest: {', '.join(levers)}."]
+        if {"left", "right"} <= means.keys():
+            left, right = (float(means[side][0][:-1].mean()) for side in ("left", "right"))
+            share = 100 * left / (left + right)
+            lines.append(f"The left foot bears {share:.0f} % of the weight, the right {100 - share:.0f} %.")
+        return lines
 
     def _schedule_words(self) -> str:
         """Return the paragraph on the schedule, with the command that walks it."""
@@ -379,11 +426,31 @@ class _Sheet:
         body = f"--mass {self._body.mass:.4g} --height {self._flags.height:g} --speed {self._speed:.3g}"
         out = self._flags.train
         policy = f"springfoot train --human {place} {body} --out {out}"
-        person = f"springfoot train --preset person --begin-from {TAUGHT} --human {place} --out {out}-person"
-        return (
-            f"To train a policy towards this person{where}: `{policy}`. To teach these curves to a learned person, "
-            f"whose body, feet and speed are drawn: `{person}`"
+        words = f"To train a policy towards this person{where}: `{policy}`. "
+        ranges = {
+            "height_range": _around(self._flags.height, HEIGHT_AROUND),
+            "mass_range": _around(self._body.mass, MASS_AROUND),
+            "speed_range": _around(self._speed, SPEED_AROUND * self._speed),
+        }
+        taught = replace(
+            PRESETS["person"].environment, human=self._measured.gait.to_json(), drawn_bodies=None, **ranges
         )
+        try:
+            for speed in tabulated_speeds(taught):
+                reference_walk_at(taught, float(speed))
+        except SpringfootError as error:
+            return f"{words}No learned person can be taught these curves: {error}."
+        flags = " ".join(f"--{name.replace('_', '-')} {low:g} {high:g}" for name, (low, high) in ranges.items())
+        person = (
+            f"springfoot train --preset person --begin-from {TAUGHT} --human {place} {flags} --drawn-bodies None "
+            f"--out {out}-person"
+        )
+        return f"{words}To teach these curves to a learned person, about this size and speed on drawn feet: `{person}`"
+
+
+def _around(value: float, width: float) -> tuple[float, float]:
+    """Return the range of `width` on either side of a value, to two decimals."""
+    return round(value - width, 2), round(value + width, 2)
 
 
 def _events(gait: HumanGait, joint: str) -> dict[float, str]:

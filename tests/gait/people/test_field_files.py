@@ -392,16 +392,111 @@ def test_moments_alone_are_divided_by_the_mass_that_is_given(tmp_path):
             read_person([files[0], files[2]], mass=MASS)
 
 
-@pytest.mark.parametrize("delay", [-0.1, 0.0, 0.1])
-def test_forces_of_another_clock_than_the_angles_are_told(delay, tmp_path):
-    files = opensim("Rajagopal", tmp_path)
-    lines = files[1].read_text(encoding="utf-8").splitlines()
+def shifted(path, delay):
+    """Write the times of an OpenSim file later by `delay` [s]."""
+    lines = path.read_text(encoding="utf-8").splitlines()
     begin = lines.index("endheader") + 2
     rows = [line.split("\t", 1) for line in lines[begin:]]
     later = [f"{float(time) + delay:.6g}\t{rest}" for time, rest in rows]
-    files[1].write_text("\n".join([*lines[:begin], *later]) + "\n", encoding="utf-8")
+    path.write_text("\n".join([*lines[:begin], *later]) + "\n", encoding="utf-8")
+
+
+@pytest.mark.parametrize("delay", [-0.1, 0.0, 0.1])
+def test_forces_of_another_clock_than_the_angles_are_told(delay, tmp_path):
+    files = opensim("Rajagopal", tmp_path)
+    shifted(files[1], delay)
     told = [note for note in read_person(files).notes if "one clock" in note]
-    assert len(told) == (delay != 0.0) and all(("later" if delay > 0 else "earlier") in note for note in told)
+    # The forces are late for the motion, and so the moments early for the forces.
+    of_motion = [note for note in told if "than the legs' motion" in note]
+    of_moments = [note for note in told if "than its force" in note]
+    assert [len(of_motion), len(of_moments)] == ([1, 2] if delay else [0, 0]) and len(told) == 3 * bool(delay)
+    assert all(("later" if delay > 0 else "earlier") in note for note in of_motion)
+    assert all(("earlier" if delay > 0 else "later") in note for note in of_moments)
+
+
+@pytest.mark.parametrize("delay", [-0.08, 0.08])
+def test_moments_of_another_clock_than_the_forces_are_told(delay, tmp_path):
+    files = opensim("Rajagopal", tmp_path)
+    shifted(files[2], delay)
+    told = [note for note in read_person(files, trust_units=True).notes if "one clock" in note]
+    assert len(told) == 2 and all(f"{'later' if delay > 0 else 'earlier'} than its force" in note for note in told)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"mtp_angle_r": -1.0, "mtp_angle_l": -1.0}, "toe-up must be positive"),
+        ({"mtp_angle_r_moment": -1.0}, "the right leg: the toe's moment is largest below 0"),
+        ({"mtp_angle_l_moment": 1e-3}, "the left leg: the toe's moment reaches .* another unit"),
+    ],
+)
+def test_a_toe_that_moves_as_none_does_is_refused(change, words, tmp_path):
+    with pytest.raises(SpringfootError, match=words):
+        read_person(with_toe_moments(opensim("Rajagopal", tmp_path), change))
+
+
+def with_toe_moments(files, change):
+    """Give files of OpenSim a toe's moment, a fifth of the ankle's; `change` is column -> its factor."""
+    for path in (files[0], files[2]):
+        lines = path.read_text().splitlines()
+        begin = lines.index("endheader") + 1
+        names = lines[begin].split("\t")
+        rows = [dict(zip(names, map(float, line.split("\t")), strict=True)) for line in lines[begin + 1 :]]
+        for row in rows:
+            for side in "lr":
+                if f"ankle_angle_{side}_moment" in row:
+                    row[f"mtp_angle_{side}_moment"] = 0.2 * row[f"ankle_angle_{side}_moment"]
+            row.update({name: factor * row[name] for name, factor in change.items() if name in row})
+        text = ["\t".join(names), *("\t".join(f"{row[name]:.6g}" for name in names) for row in rows)]
+        path.write_text("\n".join([*lines[:begin], *text]) + "\n")
+    return files
+
+
+def test_toes_that_change_places_are_refused(tmp_path):
+    for number in (0, 2):
+        files = with_toe_moments(opensim("Rajagopal", tmp_path), {})
+        text = files[number].read_text()
+        for old, new in (("mtp_angle_r", "mtp_0"), ("mtp_angle_l", "mtp_angle_r"), ("mtp_0", "mtp_angle_l")):
+            text = text.replace(old, new)
+        files[number].write_text(text)
+        with pytest.raises(SpringfootError, match="of the other foot"):
+            read_person(files)
+
+
+def test_a_leg_that_is_a_copy_of_the_other_is_refused(tmp_path):
+    files = opensim("Rajagopal", tmp_path, kinetic=False)
+    lines = files[0].read_text().splitlines()
+    begin = lines.index("endheader") + 1
+    names = lines[begin].split("\t")
+    twice = [names.index(name[:-2] + "_l" if name.endswith("_r") else name) for name in names]
+    rows = [line.split("\t") for line in lines[begin + 1 :]]
+    text = [*lines[: begin + 1], *("\t".join(row[index] for index in twice) for row in rows)]
+    files[0].write_text("\n".join(text) + "\n")
+    with pytest.raises(SpringfootError, match="both feet strike at once: is one leg a copy of the other"):
+        read_person(files)
+
+
+def test_a_file_with_fewer_rows_than_it_says_is_told(tmp_path):
+    files = opensim("Rajagopal", tmp_path)
+    files[2].write_text(files[2].read_text().replace("nRows=500", "nRows=900"))
+    told = [note for note in read_person(files).notes if "cut short" in note]
+    assert told == ["id.sto says that it has 900 rows, and has 500: was it cut short?"]
+
+
+def test_each_leg_has_its_own_toe_off_in_mean_curves(tmp_path):
+    human = human_gait(1.3)
+    columns = {"percent": np.arange(101)}
+    for side, off in (("left", 0.55), ("right", 0.7)):
+        stretched = np.minimum(PHASE * human.toe_off / off, 1.0)
+        columns |= {f"{COLUMNS[name]}_{side}": human.mean(name, stretched) for name in ("ankle", "ankle_moment")}
+        columns[f"{COLUMNS['ankle']}_{side}"] = np.degrees(columns[f"{COLUMNS['ankle']}_{side}"])
+        force = human.mean("grf_vertical", stretched)
+        columns[f"{COLUMNS['grf_vertical']}_{side}"] = force * (off > PHASE)
+    measured = read_person([write(tmp_path / "mean.csv", columns, separator=",")], trust_units=True)
+    assert [measured.toe_off(side) for side in ("left", "right")] == pytest.approx([0.55, 0.7], abs=0.015)
+    columns |= {"toe_off_percent_left": np.full(101, 57.0)}
+    measured = read_person([write(tmp_path / "mean.csv", columns, separator=",")], trust_units=True)
+    assert measured.toe_off("left") == 0.57
 
 
 def test_strides_off_the_force_plate_count_for_angles_alone(tmp_path):

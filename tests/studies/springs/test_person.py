@@ -139,7 +139,9 @@ def test_every_file_is_written_and_read_again(mine, tmp_path, capsys):
     assert {path.name for path in out.iterdir()} == {*FILES, *PICTURES}
     for words in (
         "springfoot train --human",
-        f"springfoot train --preset person --begin-from learned-2 --human {out / 'curves.csv'} --out runs/me-person",
+        f"springfoot train --preset person --begin-from learned-2 --human {out / 'curves.csv'} --height-range 1.68 "
+        "1.72 --mass-range 69 73 --speed-range ",
+        " --drawn-bodies None --out runs/me-person",
         "no property of a spring",
         "Without intervals",
         "Mass: 71.0 kg, as given",
@@ -183,7 +185,10 @@ def test_one_side_alone_and_no_mass(mine, tmp_path, capsys):
         (["MINE", "--height", "9"], "height"),
         (["MINE", "--mass", "60", "--mass", "70"], "--mass is given twice"),
         (
-            ["MINE", "--columns", "mtp_dorsiflexion_deg_left=ankle_dorsiflexion_deg_left", "--side", "left"],
+            [
+                *("MINE", "--columns", "mtp_dorsiflexion_deg_left=ankle_dorsiflexion_deg_left"),
+                *("--side", "left", "--trust-units"),
+            ],
             "no ankle angle",
         ),
     ],
