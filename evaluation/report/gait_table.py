@@ -156,22 +156,23 @@ def _legend(walks: Sequence[dict[str, Any]], with_likeness: bool) -> list[str]:
     """
     first, *_ = walks
     feet_differ = any(metrics["per_leg"] is not None for metrics in walks)
+    whose = "people's" if _people_word(first) == "people" else "your data's"
     return [
         f"{_people_word(first)}: mean curves at {first['reference']['speed_m_s']:.2f} m/s; "
         "±: SD between episodes; return: sum of rewards",
-        "RMSE: root mean square difference from people's mean curve (CoM, CoP: the plan)",
-        *(LIKENESS if with_likeness else LIKENESS_ELSEWHERE),
+        *(line.format(whose=whose) for line in (DISTANCE, *(LIKENESS if with_likeness else LIKENESS_ELSEWHERE))),
         *(BOTH_LEGS if feet_differ else ()),
         *WORDS,
     ]
 
 
+DISTANCE = "RMSE: root mean square difference from {whose} mean curve (CoM, CoP: the plan)"
 LIKENESS = (
-    "r: correlation with people's mean curve (CoM, CoP: with the plan's)",
-    "in ±SD: share of the stride with the mean curve inside people's mean ± SD",
+    "r: correlation with {whose} mean curve (CoM, CoP: with the plan's)",
+    "in ±SD: share of the stride with the mean curve inside {whose} mean ± SD",
 )
 """Lines of the legend for the columns r and in ±SD."""
-LIKENESS_ELSEWHERE = ("correlation, and share of the stride inside people's mean ± SD: metrics.json",)
+LIKENESS_ELSEWHERE = ("correlation, and share of the stride inside {whose} mean ± SD: metrics.json",)
 """Line of the legend in place of `LIKENESS`, where a table lacks these columns."""
 BOTH_LEGS = (
     "both legs: means of the two; feedback: of legs whose stiffness the policy sets",
