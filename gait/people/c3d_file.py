@@ -29,7 +29,7 @@ _PLUG_IN_GAIT = {"hip": "HipAngles", "knee": "KneeAngles", "ankle": "AnkleAngles
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Recording:
+class LaboratoryRecording:
     """A recording of a laboratory that ran Plug-in Gait: points, events and force plates."""
 
     name: str
@@ -68,7 +68,7 @@ def read_c3d(path: Path) -> Trial:
     # A label is NAME or SUBJECT:NAME; a marker's first three rows are x, y, z.
     labels = [label.rpartition(":")[2].strip() for label in parameters["POINT"]["LABELS"]["value"]]
     return trial_of_recording(
-        Recording(
+        LaboratoryRecording(
             name=path.name,
             rate=float(header["frame_rate"]),
             first_frame=int(header["first_frame"]),
@@ -81,7 +81,7 @@ def read_c3d(path: Path) -> Trial:
     )
 
 
-def trial_of_recording(recording: Recording) -> Trial:
+def trial_of_recording(recording: LaboratoryRecording) -> Trial:
     """Return the walk in a recording with Plug-in Gait's output.
 
     It reads these, and for the right leg the same with R in place of L:

@@ -28,7 +28,7 @@ from .own_data import (
 )
 from .scores import LOADING_END_PERCENT
 from .strides import (
-    EVENTS,
+    EVENT_METHODS,
     TORQUE_ANGLE_CURVES,
     LegStrides,
     MeasuredWalk,
@@ -179,9 +179,9 @@ def read_person(
                 "Stiffness needs moment and angle of one time."
             )
         notes += _notes_on_moments(legs)
-        if any(leg.events == EVENTS[-1] for leg in legs.values()):
+        if any(leg.events == EVENT_METHODS[-1] for leg in legs.values()):
             notes.append(
-                f"Heel strikes and toe-offs are by {EVENTS[-1]}, a few percent of the stride off: in walks here "
+                f"Heel strikes and toe-offs are by {EVENT_METHODS[-1]}, a few percent of the stride off: in walks here "
                 "quasi-stiffness next to them was up to a half off, and a few percent elsewhere."
             )
         if any(name.endswith("_moment") for _, name in walk.unscaled) and mass is None and borne is None:

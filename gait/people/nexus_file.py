@@ -16,16 +16,16 @@ from springfoot.arrays import NDArray
 from springfoot.errors import SpringfootError
 from springfoot.files.text_table import Table, make_table, text_lines
 
-from .c3d_file import Recording, contacts_of_events
+from .c3d_file import LaboratoryRecording, contacts_of_events
 from .gait_events import Contacts
 
-EVENTS, DEVICES = "Events", "Devices"
+EVENTS_SECTION, DEVICES_SECTION = "Events", "Devices"
 POINTS = ("Model Outputs", "Trajectories")
 """Sections of points, three components each."""
-SECTIONS = (EVENTS, DEVICES, *POINTS, "Joints", "Segments")
+SECTIONS = (EVENTS_SECTION, DEVICES_SECTION, *POINTS, "Joints", "Segments")
 """Names with which a section begins; the last two are not read."""
 
-Row = tuple[int, list[str]]
+CsvLine = tuple[int, list[str]]
 """Number of a line, and its cells."""
 
 
@@ -35,7 +35,7 @@ def is_nexus(path: Path) -> bool:
     return _name(first.split(",")) is not None
 
 
-def read_nexus(path: Path) -> Recording:
+def read_nexus(path: Path) -> LaboratoryRecording:
     """Return a walk that Nexus exported; raise `SpringfootError` for a file of another form, by line and column."""
     sections = dict(_sections(path))
     of_points = [_section(path.name, sections[name]) for name in POINTS if name in sections]
@@ -53,14 +53,16 @@ def read_nexus(path: Path) -> Recording:
                 point = points.setdefault(name, np.full((3, count), np.nan))
                 point["XYZ".index(component), numbers - first] = section.table.numbers(column, gaps=True)
                 in_nm |= name.endswith("Moment") and unit.startswith("nm/")
-    return Recording(
+    return LaboratoryRecording(
         name=path.name,
         rate=of_points[0].rate,
         first_frame=first,
         points=points,
         moments_in_nm=in_nm,
-        events=_events(path.name, sections[EVENTS]) if EVENTS in sections else {},
-        plates=_plates(_section(path.name, sections[DEVICES]), first, count) if DEVICES in sections else (),
+        events=_events(path.name, sections[EVENTS_SECTION]) if EVENTS_SECTION in sections else {},
+        plates=_plates(_section(path.name, sections[DEVICES_SECTION]), first, count)
+        if DEVICES_SECTION in sections
+        else (),
     )
 
 
@@ -70,10 +72,10 @@ def _name(cells: Sequence[str]) -> str | None:
     return filled[0] if len(filled) == 1 and filled[0] in SECTIONS else None
 
 
-def _sections(path: Path) -> Iterator[tuple[str, list[Row]]]:
+def _sections(path: Path) -> Iterator[tuple[str, list[CsvLine]]]:
     """Yield the name of each section, and the lines below it that are not empty."""
     name = ""
-    rows: list[Row] = []
+    rows: list[CsvLine] = []
     try:
         for number, cells in enumerate(csv.reader(text_lines(path), strict=True), 1):
             if (begins := _name(cells)) is not None:
@@ -99,7 +101,7 @@ class _Section(NamedTuple):
     """Column -> its unit in lower case without blanks and dots, such as nmm/kg."""
 
 
-def _section(file: str, rows: list[Row]) -> _Section:
+def _section(file: str, rows: list[CsvLine]) -> _Section:
     """Return a section of numbers from its lines; raise `SpringfootError` for lines of another form."""
     if len(rows) < 5:
         raise SpringfootError(f"{file} is cut short: a section needs rate, names, components, units and rows")
@@ -152,7 +154,7 @@ def _plates(devices: _Section, first: int, count: int) -> list[dict[str, Any]]:
     return plates
 
 
-def _events(file: str, rows: list[Row]) -> dict[str, Contacts]:
+def _events(file: str, rows: list[CsvLine]) -> dict[str, Contacts]:
     """Return side -> events of a section with the columns Context, Name and Time (s)."""
     table = make_table(file, rows[1:])
     text = {}

@@ -21,7 +21,7 @@ FINE_PERCENT = np.linspace(0.0, 100.0, 1001)
 """Percents of the stride at which torque-angle curves are read; chosen: phases of stance begin between whole percents,
 and slopes of short ones differ by up to a third if they are read at these alone."""
 TORQUE_ANGLE_CURVES = ("ankle", "toe", "ankle_moment", "toe_moment")
-EVENTS = ("the vertical force", "the events of the files", "the motion of heel and toe")
+EVENT_METHODS = ("the vertical force", "the events of the files", "the motion of heel and toe")
 """Methods that find heel strikes and toe-offs, in the order in which they are tried."""
 ANGLE_CURVES = ("thigh", "hip", "knee", "ankle", "toe")
 """Curves that need no force plate."""
@@ -128,7 +128,7 @@ class LegStrides:
     """Curve of `TORQUE_ANGLE_CURVES` -> (S, 1001) over `FINE_PERCENT`, or (S, 101) of mean curves, in the units of
     `curves`."""
     events: str = ""
-    """Name in `EVENTS` of the method that found heel strikes and toe-offs; empty for mean curves."""
+    """Name in `EVENT_METHODS` of the method that found heel strikes and toe-offs; empty for mean curves."""
     toe_off: float | None = None
     """Phase of toe-off of mean curves, 0..1."""
 
@@ -436,7 +436,7 @@ def borne_mass(walk: MeasuredWalk) -> BorneMass | None:
 
 def _strides_of_leg(walk: MeasuredWalk, side: str, weight: float | None) -> tuple[NDArray, str]:
     """Return (S, 3) heel strike, toe-off, next heel strike [s] of one leg, by the first method that finds enough, and
-    its name in `EVENTS`. `weight` as in `_legs_by_weight`."""
+    its name in `EVENT_METHODS`. `weight` as in `_legs_by_weight`."""
     leg = walk.legs[side]
     methods: tuple[Callable[[], Contacts | None], ...] = (
         lambda: _contacts_of_force(walk, leg, weight),
@@ -444,8 +444,8 @@ def _strides_of_leg(walk: MeasuredWalk, side: str, weight: float | None) -> tupl
         lambda: _contacts_of_motion(walk, leg),
     )
     best = np.empty((0, 3))
-    name = EVENTS[0]
-    for method_name, method in zip(EVENTS, methods, strict=True):
+    name = EVENT_METHODS[0]
+    for method_name, method in zip(EVENT_METHODS, methods, strict=True):
         # A later method counts only if those before it found too few.
         if len(best) >= FEWEST_STRIDES or (contacts := method()) is None:
             continue
