@@ -181,8 +181,8 @@ def read_person(
         notes += _notes_on_moments(legs)
         if any(leg.events == EVENT_METHODS[-1] for leg in legs.values()):
             notes.append(
-                f"Heel strikes and toe-offs are by {EVENT_METHODS[-1]}, a few percent of the stride off: in walks here "
-                "quasi-stiffness next to them was up to a half off, and a few percent elsewhere."
+                f"Heel strikes and toe-offs are by {EVENT_METHODS[-1]}: in walks here quasi-stiffness of controlled "
+                "plantarflexion was then up to a half off, of the toe's push-off a fifth, elsewhere a tenth."
             )
         if any(name.endswith("_moment") for _, name in walk.unscaled) and mass is None and borne is None:
             notes.append("Moments left out: they are in N m, and without forces only --mass tells the body mass.")
