@@ -34,7 +34,7 @@ from ..base.study import Answer, OnProgress, WalkingStudy
 from .adapting_persons import person_and_settings
 from .foot_numbers import numbers_of_feet
 from .orthosis import braced_calf
-from .told_apart import GAP, TOLERANCE, common_speed, difference, price_at, verdict
+from .told_apart import GAP, common_speed, comparison, difference, price_at, verdict
 from .walked_speeds import TWO_PRICES, Row, rows_csv
 
 MOST_FEET = 8
@@ -196,11 +196,10 @@ class FootChoice(WalkingStudy):
         files = {
             "feet.csv": rows_csv(rows),
             "prices.csv": rows_csv(self._price_rows(prices, speed)),
-            "feet.png": partial(self._draw, names=names, prices=prices),
+            "feet.png": lambda path: _draw(path, names, self.spring, prices),
             "report.html": partial(write_page, walks=shown, command=self.command, words_of=self._words_of()),
         }
-        common = any(values is not None for values in prices[TWO_PRICES[0]])
-        where = _where(self.speed, speed, walked) if common else "No walked speed is common to all feet: no prices."
+        where = comparison(self.speed, speed, dict(zip(names, walked, strict=True)), prices[TWO_PRICES[0]])
         return Answer(text=self._text(names, rows, prices, speed, where), files=files)
 
     @property
@@ -250,20 +249,18 @@ class FootChoice(WalkingStudy):
         speed: float,
         where: str,
     ) -> str:
-        """Return the report; `where` tells the walked `speed` [m/s] of the comparison."""
-        verdicts = [verdict(words, names, prices[price]) for price, words in PRICE_NAMES.items()]
+        """Return the report; `where` tells the walked `speed` [m/s] of the comparison, and feet without a price."""
+        priced = {price: _priced(names, of_feet) for price, of_feet in prices.items()}
+        first = next(iter(priced[TWO_PRICES[0]]), None)
         lines = []
-        for index, name in enumerate(names):
+        for name in names:
             here = [row for row in rows if row["foot"] == name]
-            of_foot = [of_price[index] for of_price in prices.values()]
-            absolute = [text_of(None if values is None else float(values.mean()), ".2f") for values in of_foot]
-            changes = [_change(of_price[index], of_price[0]) if index else MISSING for of_price in prices.values()]
             lines.append(
                 [
                     name,
                     " / ".join(_share(here, key) for key in ("falls", "falls_other_speed", "falls_pushed")),
                     _mean(here, "speed_m_s", ".2f"),
-                    *(cell for pair in zip(absolute, changes, strict=True) for cell in pair),
+                    *(cell for of_price in priced.values() for cell in price_cells(of_price, name)),
                     *(_mean(here, key, pattern) for key, pattern in _COLUMNS.values()),
                 ]
             )
@@ -277,60 +274,86 @@ class FootChoice(WalkingStudy):
             "change",
             *_COLUMNS,
         ]
-        are_priced = any(values is not None for values in prices[TWO_PRICES[0]])
+        answer = f"**{where}**"
+        if first:
+            fibre_work, effort = (verdict(words, priced[price]) for price, words in PRICE_NAMES.items())
+            answer = f"**{where} {fibre_work}** {effort} {WHICH_PRICE}"
         return "\n\n".join(
             [
-                f"**{where} {verdicts[0]}** {verdicts[1]} {WHICH_PRICE if are_priced else ''}".rstrip(),
+                answer,
                 table(head, lines),
-                self._how(names[0], speed if are_priced else None),
+                self._how(first, speed),
                 f"What this cannot say:\n\n{CANNOT_SAY}",
                 "![Price of the walk on each foot](feet.png)",
             ]
         )
 
-    def _how(self, first: str, speed: float | None) -> str:
-        """Return the paragraph on how the table was made: prices at a walked `speed` [m/s], None if no foot has a
-        price, changes against the foot `first`."""
+    def _how(self, first: str | None, speed: float) -> str:
+        """Return the paragraph on how the table was made: prices at a walked `speed` [m/s], changes against the foot
+        `first`, the first with a price; None if no foot has one."""
         calf = "" if self.calf is None else f", calves of {self.calf:.0%}"
         worn = "both feet" if self.side == "both" else f"the {self.side} foot"
-        intervals = "" if len(self.persons) == 1 else ", with 95 % intervals over persons"
+        several = len(self.persons) > 1
         prices = (
             ""
-            if speed is None
-            else f"Prices in this table are at {speed:.2f} m/s walked, the nearest to the asked speed that all walk; "
-            "prices.csv has them by episode, feet.csv those of the speed that each walks. "
-            f"Changes are against {first}{intervals}. "
+            if first is None
+            else f"Prices in this table are at {speed:.2f} m/s walked, the nearest to the asked speed that all walk on "
+            "the feet that have a price; prices.csv has them by episode, feet.csv those of the speed that each walks. "
+            f"Changes are against {first}{', with 95 % intervals over persons' if several else ''}. "
+        )
+        apart = (
+            f"Feet are told apart by {100 * GAP:g} % or more, an interval without 0 and one sign of all persons; alike "
+            f"are those whose interval lies within {100 * GAP:g} %, the others uncertain."
+            if several
+            else "One person has no interval, so that no feet are told apart."
         )
         return (
             f"{self.height:g} m, {self.mass:g} kg{calf}, on {worn}, asked for {self.speed:g} m/s. "
             f"Persons: {', '.join(self.persons)}. Each walks on each foot {self.what_ran}, as much at "
             f"{self._other_speed:.3g} m/s, and as much pushed by ±{self.push_newton:g} N. {prices}"
-            f"Feet less than {GAP:.0%} apart are not told apart; one that falls or does not reach the speed has no "
-            "price. Push-off, of ankle and toe, is of the side that wears the foot; the largest 10 ms of force "
+            f"{apart} A foot on which somebody falls or does not reach the speed has no price. "
+            "Push-off, of ankle and toe, is of the side that wears the foot; the largest 10 ms of force "
             "in a stride and moments are of the other side, the left one if both wear it."
         )
 
-    def _draw(self, path: Path, names: Sequence[str], prices: Mapping[str, Sequence[NDArray | None]]) -> None:
-        """Draw both prices of every foot: pale for each person, and their mean."""
-        with matplotlib.rc_context(STYLE):
-            figure = Figure(figsize=(9.0, 3.6), layout="constrained")
-            places = np.array(self.spring) if self.spring else np.arange(len(names))
-            for ax, (price, words) in zip(figure.subplots(1, len(PRICE_NAMES)), PRICE_NAMES.items(), strict=True):
-                walked = [(x, values) for x, values in zip(places, prices[price], strict=True) if values is not None]
-                if walked:
-                    x = [place for place, _ in walked]
-                    by_person = np.array([values.mean(1) for _, values in walked]).T
-                    line = "-" if self.spring else "none"  # feet are in no order
-                    for values in by_person:
-                        ax.plot(x, values, "o", ls=line, color="#0b6e8f", ms=3, lw=0.8, alpha=0.4)
-                    ax.plot(x, by_person.mean(0), "o", ls=line, color="#0b6e8f", ms=5, lw=1.6)
-                ax.set_title(f"{words}, {'J/kg/m' if price == TWO_PRICES[0] else 'dimensionless'}")
-                if self.spring:
-                    ax.set_xlabel("spring (N·m/deg)")
-                else:
-                    ax.set_xticks(places, names, rotation=20, ha="right")
-                ax.grid(color="#ededed", lw=0.6)
-            figure.savefig(path, dpi=110, facecolor="white", metadata={"Software": "springfoot"})
+
+def price_figure(
+    names: Sequence[str], springs: Sequence[float], prices: Mapping[str, Sequence[NDArray | None]]
+) -> Figure:
+    """Return a drawing of both prices of every foot: pale for each person, and their mean; words where no foot has one.
+
+    Args:
+        names: names of the feet.
+        springs: their springs [N m/deg]; none for other feet.
+        prices: column of a price -> prices (persons, episodes) on each foot; None on a foot without a price.
+    """
+    figure = Figure(figsize=(9.0, 3.6), layout="constrained")
+    places = np.array(springs) if springs else np.arange(len(names))
+    for ax, (price, words) in zip(figure.subplots(1, len(PRICE_NAMES)), PRICE_NAMES.items(), strict=True):
+        walked = [(x, values) for x, values in zip(places, prices[price], strict=True) if values is not None]
+        if walked:
+            x = [place for place, _ in walked]
+            by_person = np.array([values.mean(1) for _, values in walked]).T
+            line = "-" if springs else "none"  # feet are in no order
+            for values in by_person:
+                ax.plot(x, values, "o", ls=line, color="#0b6e8f", ms=3, lw=0.8, alpha=0.4)
+            ax.plot(x, by_person.mean(0), "o", ls=line, color="#0b6e8f", ms=5, lw=1.6)
+        else:
+            ax.text(0.5, 0.5, "no foot has a price", transform=ax.transAxes, ha="center", va="center")
+            ax.set(xticks=[], yticks=[])
+        ax.set_title(f"{words}, {'J/kg/m' if price == TWO_PRICES[0] else 'dimensionless'}")
+        if springs:
+            ax.set_xlabel("spring (N·m/deg)")
+        else:
+            ax.set_xticks(places, names, rotation=20, ha="right")
+        ax.grid(color="#ededed", lw=0.6)
+    return figure
+
+
+def _draw(path: Path, *which: Any) -> None:
+    """Save the drawing of `price_figure`, with its arguments `which`, as a picture."""
+    with matplotlib.rc_context(STYLE):
+        price_figure(*which).savefig(path, dpi=110, facecolor="white", metadata={"Software": "springfoot"})
 
 
 _COLUMNS = {
@@ -343,25 +366,19 @@ _COLUMNS = {
 """Heading -> column and format of the numbers that are told without an interval."""
 
 
-def _where(asked: float, speed: float, walked: Sequence[NDArray | None]) -> str:
-    """Return a sentence on the walked `speed` [m/s] of the comparison, and on the persons that do not reach the one
-    `asked` for.
-
-    `walked` as in `common_speed`.
-    """
-    # Of each foot without a fall the fastest walk of its slowest person.
-    fastest = [float(speeds.mean(-1).max(0).min()) for speeds in walked if speeds is not None]
-    short = sum(value < asked - TOLERANCE for value in fastest)
-    if not short:
-        return f"Compared at {speed:.2f} m/s walked."
-    who = "no foot reaches" if short == len(fastest) else "not every foot reaches"
-    return f"Compared at {speed:.2f} m/s walked, as {who} the asked {asked:g} m/s."
+def _priced(names: Sequence[str], prices: Sequence[NDArray | None]) -> dict[str, NDArray]:
+    """Return name -> prices (persons, episodes) of the feet that have some."""
+    return {name: values for name, values in zip(names, prices, strict=True) if values is not None}
 
 
-def _change(prices: NDArray | None, first: NDArray | None) -> str:
-    """Return the difference of a foot's prices (persons, episodes) from those of the `first` foot, in words; a dash if
-    either is None."""
-    return MISSING if prices is None or first is None else difference(prices, first).text
+def price_cells(priced: Mapping[str, NDArray], name: str) -> tuple[str, str]:
+    """Return the mean price of the foot `name`, and its change against the first of those `priced`, in words; dashes
+    without one."""
+    if name not in priced:
+        return MISSING, MISSING
+    first = next(iter(priced))
+    change = MISSING if name == first else difference(priced[name], priced[first]).text
+    return f"{priced[name].mean():.2f}", change
 
 
 def _mean(rows: Sequence[Row], key: str, pattern: str) -> str:

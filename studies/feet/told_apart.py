@@ -1,13 +1,14 @@
-"""Tell which of several feet takes least at one walked speed, and which feet are told apart from it.
+"""Tell which of several feet takes least at one walked speed, which are told apart from it, and which are alike.
 
 Every person walks the same episodes on every foot, so that feet are compared in pairs of episodes. Two feet are told
 apart if they differ by `GAP` or more, the 95 % interval of the difference leaves 0 out, and every person has its sign.
-The interval is over persons, as one person's episodes are alike and say nothing of how others learn.
+They are alike if the interval lies within `GAP`, else uncertain. The interval is over persons, as one person's episodes
+are alike and say nothing of how others learn: of one person nothing is told apart, and nothing is alike.
 A slower walk has another price: so prices are taken at one speed that all walk, between two walks at two commanded
 speeds, never beyond them.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,7 +34,13 @@ class Difference:
     persons: int
     """Number of persons."""
     told_apart: bool
-    """True if the mean is `GAP` or more, the interval leaves 0 out, and every person's mean has its sign."""
+    """True if the mean is `GAP` or more, the interval leaves 0 out, and every person's mean has its sign; False of one
+    person."""
+
+    @property
+    def alike(self) -> bool:
+        """Return True if the interval lies within `GAP` either way; False of one person."""
+        return self.persons > 1 and self.low > -GAP and self.high < GAP
 
     @property
     def text(self) -> str:
@@ -56,7 +63,8 @@ def difference(prices: NDArray, others: NDArray) -> Difference:
     low, high = interval_of_persons([*shares])
     mean = float(of_persons.mean())
     signs = np.sign(of_persons)
-    apart = abs(mean) >= GAP and (low > 0.0 or high < 0.0) and bool((signs == signs[0]).all())
+    leaves_0_out = len(prices) > 1 and (low > 0.0 or high < 0.0)
+    apart = abs(mean) >= GAP and leaves_0_out and bool((signs == signs[0]).all())
     return Difference(mean=mean, low=low, high=high, persons=len(prices), told_apart=apart)
 
 
@@ -68,15 +76,38 @@ TOLERANCE = 0.005
 
 def common_speed(asked: float, walked: Sequence[NDArray | None]) -> float:
     """Return the walked speed [m/s] nearest to the one `asked` for that lies between the two walks of every person on
-    every foot; `asked` itself if there is none.
+    all feet that have such a speed in common.
+
+    Feet that have none with the others are left out one by one, the slowest first, as one too stiff spring would leave
+    no answer on all others. It is `asked` itself if no foot has a speed that all persons walk on it.
 
     `walked` has for each foot the speeds (2, P, E) [m/s] of two walks of P persons in E episodes; None for a foot on
     which an episode fell.
     """
     of_persons = [speeds.mean(-1) for speeds in walked if speeds is not None]
-    slowest = max((float(speeds.min(0).max()) for speeds in of_persons), default=asked)
-    fastest = min((float(speeds.max(0).min()) for speeds in of_persons), default=asked)
-    return float(np.clip(asked, slowest, fastest)) if slowest <= fastest else asked
+    spans = [(float(speeds.min(0).max()), fastest_of_all(speeds)) for speeds in of_persons]
+    spans = sorted((span for span in spans if span[0] <= span[1]), key=lambda span: span[1])
+    for left_out, (_, fastest) in enumerate(spans):
+        slowest = max(low for low, _ in spans[left_out:])
+        if slowest <= fastest:
+            return float(np.clip(asked, slowest, fastest))
+    return asked
+
+
+def fastest_of_all(speeds: NDArray) -> float:
+    """Return the largest speed [m/s] that every person reaches in one of two walks, of `speeds` (2, P) [m/s]."""
+    return float(speeds.max(0).min())
+
+
+def without_price(speed: float, walked: NDArray | None) -> str:
+    """Return words on why a foot has no price at a walked `speed` [m/s]; `walked` is an entry of those of
+    `common_speed`."""
+    if walked is None:
+        return "somebody falls"
+    fastest = fastest_of_all(walked.mean(-1))
+    if fastest < speed - TOLERANCE:
+        return f"too slow, {fastest:.2f} m/s at most"
+    return "somebody has no two walks around that speed"
 
 
 def price_at(speed: float, walked: NDArray, prices: NDArray) -> NDArray | None:
@@ -98,33 +129,67 @@ def price_at(speed: float, walked: NDArray, prices: NDArray) -> NDArray | None:
     return prices[0] + (prices[1] - prices[0]) * (speed - walked[0]) / change
 
 
-def verdict(price: str, names: Sequence[str], prices: Sequence[NDArray | None]) -> str:
-    """Return a sentence on the foot of least price, those like it, the dearer ones, and the saving against the first.
+def comparison(
+    asked: float, speed: float, walked: Mapping[str, NDArray | None], prices: Sequence[NDArray | None]
+) -> str:
+    """Return sentences on the walked `speed` [m/s] of the comparison, on whether its feet reach the one `asked` for,
+    and on the feet without a price.
+
+    `walked` has by name of a foot an entry of those of `common_speed`, `prices` one price of each foot.
+    """
+    unknown = [
+        f"{name} ({without_price(speed, speeds)})"
+        for (name, speeds), values in zip(walked.items(), prices, strict=True)
+        if values is None
+    ]
+    compared = [
+        fastest_of_all(speeds.mean(-1))
+        for speeds, values in zip(walked.values(), prices, strict=True)
+        if speeds is not None and values is not None
+    ]
+    if not compared:
+        return f"No foot has a price: {', '.join(unknown)}."
+    short = sum(fastest < asked - TOLERANCE for fastest in compared)
+    who = "no foot reaches" if short == len(compared) else "not every foot reaches"
+    why = f", as {who} the asked {asked:g} m/s" if short else ""
+    without = f" Without a price: {', '.join(unknown)}." if unknown else ""
+    return f"Compared at {speed:.2f} m/s walked{why}.{without}"
+
+
+def verdict(price: str, prices: Mapping[str, NDArray]) -> str:
+    """Return sentences on the foot of least price, those alike, the saving against the first, and the other feet.
+
+    Feet that are neither alike nor told apart are uncertain, and have their interval. Of one person all changes are
+    told, without a word on which are alike.
 
     Args:
         price: name of the price, such as "fibre work".
-        names: names of the feet; the others are compared with the first.
-        prices: for each foot the prices (P, E) of P persons in E episodes; None where one fell or was too slow.
+        prices: name of a foot -> prices (P, E) of P persons in E episodes; one foot at least.
     """
-    walked = {name: values for name, values in zip(names, prices, strict=True) if values is not None}
-    if not walked:
-        return f"{price.capitalize()} is unknown: on every foot somebody falls or is too slow."
-    least = min(walked, key=lambda name: walked[name].mean())
-    against_least = {name: difference(values, walked[least]) for name, values in walked.items() if name != least}
-    like_least = [name for name in walked if name == least or not against_least[name].told_apart]
-    first = names[0]
-    others = [name for name in like_least if name != least]
+    first = next(iter(prices))
+    least = min(prices, key=lambda name: prices[name].mean())
+    if len(prices) == 1:
+        return f"{price.capitalize()} is known with {least} alone."
+    changes = {name: difference(values, prices[least]) for name, values in prices.items() if name != least}
     sentence = f"{price.capitalize()} is least with {least}"
-    if others:
-        sentence += f", not told apart from {_list(others)}"
-    if first not in walked:
-        sentence += f"; unknown with {first}, on which somebody falls or is too slow"
-    elif first not in like_least:
-        sentence += f": {difference(walked[least], walked[first]).text} against {first}"
-    dearer = [f"{name} {_percent(against_least[name].mean)} %" for name in walked if name not in (*like_least, first)]
-    sentence += f". Against {least}: {_list(dearer)}." if dearer else "."
-    unknown = [name for name in names[1:] if name not in walked]
-    return f"{sentence} Unknown, as somebody falls or is too slow: {_list(unknown)}." if unknown else sentence
+    if len(prices[least]) == 1:
+        return f"{sentence}, of one person: no interval.{_against(least, changes)}"
+    if alike := [name for name, change in changes.items() if change.alike]:
+        sentence += f", alike (within {100 * GAP:g} %) with {_list(alike)}"
+    dearer = {name: change for name, change in changes.items() if change.told_apart}
+    if dearer.pop(first, None):
+        sentence += f": {difference(prices[least], prices[first]).text} against {first}"
+    uncertain = [
+        f"{name}, {change.text}" for name, change in changes.items() if not (change.alike or change.told_apart)
+    ]
+    doubts = f" Uncertain against {least}: {'; '.join(uncertain)}." if uncertain else ""
+    return f"{sentence}.{_against(least, dearer)}{doubts}"
+
+
+def _against(least: str, changes: Mapping[str, Difference]) -> str:
+    """Return a sentence on the changes of feet against the foot `least`, after a space; nothing without a change."""
+    told = [f"{name} {_percent(change.mean)} %" for name, change in changes.items()]
+    return f" Against {least}: {_list(told)}." if told else ""
 
 
 def _percent(share: float) -> str:

@@ -2,11 +2,12 @@
 
 import csv
 
+import numpy as np
 import pytest
 
 from springfoot.cli.main import main
 from springfoot.errors import SpringfootError
-from springfoot.studies.feet.foot_choice import named_feet
+from springfoot.studies.feet.foot_choice import PRICE_NAMES, named_feet, price_cells, price_figure
 
 QUICK = ["feet", "--quick", "--threads", "1"]
 
@@ -100,3 +101,15 @@ def test_feet_have_their_words_or_the_name_of_their_file(tmp_path):
         named_feet([str(file), str(other)])
     with pytest.raises(SpringfootError, match=r"^--foot: ankle_stiffness must be in \[0, 3000\] N m/rad, got 5000$"):
         named_feet(['{"kind": "passive", "ankle_stiffness": 5000}'])
+
+
+def test_changes_are_against_the_first_foot_that_has_a_price():
+    priced = {"4": np.full((1, 2), 3.0), "6": np.full((1, 2), 3.3)}  # none of "0", which stands before them
+    assert [price_cells(priced, name) for name in ("0", "4", "6")] == [("–", "–"), ("3.00", "–"), ("3.30", "+10 %")]
+
+
+def test_a_drawing_without_a_price_says_so():
+    prices = np.ones((3, 5))
+    for of_feet, words in (([prices, None], []), ([None, None], ["no foot has a price"])):
+        figure = price_figure(["0", "4"], (0.0, 4.0), dict.fromkeys(PRICE_NAMES, of_feet))
+        assert [[text.get_text() for text in ax.texts] for ax in figure.axes] == [words, words]

@@ -1,9 +1,18 @@
-"""Feet told apart: planted prices, persons that disagree, differences below the gap, prices at one speed."""
+"""Feet told apart, alike or uncertain: planted prices, persons that disagree, prices at one speed that all walk."""
 
 import numpy as np
 import pytest
 
-from springfoot.studies.feet.told_apart import GAP, LEAST_CHANGE, common_speed, difference, price_at, verdict
+from springfoot.studies.feet.told_apart import (
+    GAP,
+    LEAST_CHANGE,
+    common_speed,
+    comparison,
+    difference,
+    price_at,
+    verdict,
+    without_price,
+)
 
 NOISE = 0.01 * np.random.default_rng(0).standard_normal((3, 8))
 """Of three persons in eight episodes."""
@@ -31,23 +40,41 @@ def test_a_foot_is_not_told_apart_from_itself_in_other_episodes():
     assert not difference(prices, prices[:, ::-1]).told_apart
 
 
-def test_the_verdict_names_the_least_its_like_and_the_dearer():
-    first = np.full((3, 5), 4.0)
-    prices = [first, 0.75 * first, 0.76 * first, 0.9 * first, None]
-    words = verdict("fibre work", ["none", "4", "6", "9", "12"], prices)
-    assert (
-        words
-        == "Fibre work is least with 4, not told apart from 6: −25 % (−25 to −25) against none. Against 4: 9 +20 %."
-        " Unknown, as somebody falls or is too slow: 12."
+FIRST = np.full((3, 5), 4.0)
+"""Prices of three persons in five episodes."""
+
+
+def test_the_verdict_names_the_least_those_alike_and_the_dearer():
+    prices = {"none": FIRST, "4": 0.75 * FIRST, "6": 0.76 * FIRST, "9": 0.9 * FIRST}
+    assert verdict("fibre work", prices) == (
+        "Fibre work is least with 4, alike (within 5 %) with 6: −25 % (−25 to −25) against none. Against 4: 9 +20 %."
     )
-    assert (
-        verdict("effort", ["none", "4"], [first, 0.99 * first]) == "Effort is least with 4, not told apart from none."
+    assert verdict("effort", {"none": FIRST, "4": 0.99 * FIRST}) == (
+        "Effort is least with 4, alike (within 5 %) with none."
     )
-    assert verdict("effort", ["none", "4"], [None, first]) == (
-        "Effort is least with 4; unknown with none, on which somebody falls or is too slow."
+    assert verdict("effort", {"4": FIRST}) == "Effort is known with 4 alone."
+
+
+def test_a_foot_of_which_persons_disagree_is_uncertain_and_not_alike():
+    of_persons = np.array([1.1, 1.23, 1.36])[:, None]
+    prices = {"4": FIRST, "2": 1.01 * FIRST, "9": 1.13 * FIRST, "12": of_persons * FIRST}
+    reach = 4.302653 * 0.13 / np.sqrt(3)  # Student's t of two degrees of freedom at 97.5 %
+    change = difference(prices["12"], FIRST)
+    assert (change.low, change.high) == pytest.approx((0.23 - reach, 0.23 + reach))
+    assert not change.told_apart and not change.alike
+    assert verdict("fibre work", prices) == (
+        "Fibre work is least with 4, alike (within 5 %) with 2. Against 4: 9 +13 %."
+        " Uncertain against 4: 12, +23 % (−9 to +55)."
     )
-    assert verdict("effort", ["none", "4"], [None, None]) == (
-        "Effort is unknown: on every foot somebody falls or is too slow."
+
+
+def test_of_one_person_no_feet_are_told_apart_or_alike():
+    one = FIRST[:1]
+    for factor in (1.0, 1.5):
+        change = difference(factor * one, one)
+        assert not change.told_apart and not change.alike
+    assert verdict("fibre work", {"none": one, "4": 0.8 * one, "6": 0.88 * one}) == (
+        "Fibre work is least with 4, of one person: no interval. Against 4: none +25 % and 6 +10 %."
     )
 
 
@@ -80,5 +107,38 @@ def test_feet_are_compared_at_a_speed_that_all_walk():
     assert common_speed(1.1, [WALKED, slower, None]) == 1.1
     assert common_speed(1.3, [WALKED, slower]) == pytest.approx(1.14)  # the fastest of the slower one
     assert common_speed(0.8, [WALKED, slower]) == pytest.approx(1.05)  # the slowest of the other
-    assert common_speed(1.1, [WALKED, WALKED - 0.5]) == 1.1  # there is none
     assert common_speed(1.1, [None]) == 1.1
+
+
+def test_a_foot_too_slow_for_the_others_is_left_out_and_told_from_one_on_which_somebody_falls():
+    slow = WALKED - 0.3
+    walked = [WALKED, WALKED - 0.02, slow, slow - 0.1, None]
+    speed = common_speed(1.3, walked)
+    assert speed == pytest.approx(1.18)  # the fastest of the second, not the asked one
+    priced = [values is not None and price_at(speed, values, 3.0 + values) is not None for values in walked]
+    assert priced == [True, True, False, False, False]
+    assert [without_price(speed, values) for values in walked[2:]] == [
+        "too slow, 0.90 m/s at most",
+        "too slow, 0.80 m/s at most",
+        "somebody falls",
+    ]
+
+
+def test_the_comparison_names_its_speed_and_feet_without_a_price():
+    prices = [np.ones((1, 2)), None, None]
+    walked = {"none": WALKED, "15": WALKED - 0.3, "drop": None}
+    without = "Without a price: 15 (too slow, 0.90 m/s at most), drop (somebody falls)."
+    assert comparison(1.1, 1.1, walked, prices) == f"Compared at 1.10 m/s walked. {without}"
+    assert comparison(1.3, 1.2, walked, prices) == (
+        f"Compared at 1.20 m/s walked, as no foot reaches the asked 1.3 m/s. {without}"
+    )
+    assert comparison(1.1, 1.1, {"15": WALKED - 0.3, "drop": None}, [None, None]) == (
+        "No foot has a price: 15 (too slow, 0.90 m/s at most), drop (somebody falls)."
+    )
+
+
+def test_a_foot_on_which_persons_have_no_common_speed_keeps_no_other_from_one():
+    apart = np.concatenate([WALKED, WALKED + 0.3], axis=1)  # one person from 1.05 to 1.2 m/s, one from 1.35 to 1.5
+    assert common_speed(1.1, [WALKED - 0.1, apart]) == pytest.approx(1.1)
+    assert without_price(1.1, apart) == "somebody has no two walks around that speed"
+    assert common_speed(1.1, [apart]) == 1.1
