@@ -6,10 +6,11 @@
 All persons walk the same episodes on all feet, undisturbed at two commanded speeds, and pushed.
 """
 
+from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from os.path import isfile
+from os.path import isfile, realpath
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -18,7 +19,7 @@ import numpy as np
 import tyro
 from matplotlib.figure import Figure
 
-from springfoot.agents.policies import PolicyFunction
+from springfoot.agents.policies import SHIPPED, PolicyFunction
 from springfoot.arrays import NDArray
 from springfoot.envs import BipedSettings
 from springfoot.envs.settings import FootSetting, body_of, foot_setting, settings_from
@@ -102,6 +103,18 @@ def named_feet(values: Sequence[str]) -> dict[str, Any]:
     return named
 
 
+def _spring_name(stiffness: float) -> str:
+    """Return the name of a spring of a `stiffness` [N m/deg]."""
+    return f"{stiffness + 0.0:g} N·m/deg"  # -0 is 0
+
+
+def _refuse_repeats(flag: str, names: Sequence[str]) -> None:
+    """Raise `SpringfootError` for a name that stands twice among those of a `flag`."""
+    for name, count in Counter(names).items():
+        if count > 1:
+            raise SpringfootError(f"{flag}: {name} is given {count} times; give each once")
+
+
 @dataclass(frozen=True, kw_only=True)
 class FootChoice(WalkingStudy):
     """Which foot for this person? Walks learned persons on every foot, and tells which takes least.
@@ -147,6 +160,8 @@ class FootChoice(WalkingStudy):
             raise SpringfootError(
                 "give either --spring or --foot, such as --spring 0 2 4 6 or --foot intact --foot rigid"
             )
+        _refuse_repeats("--spring", [_spring_name(k) for k in self.spring])
+        _refuse_repeats("--persons", [name if name in SHIPPED else realpath(name) for name in self.persons])
         if self.foot and (self.calf is not None or self.rest_deg):
             raise SpringfootError("--calf and --rest-deg go with --spring; a foot of --foot has numbers of its own")
         count = len(self.feet)
@@ -158,7 +173,7 @@ class FootChoice(WalkingStudy):
         """Return name -> setting of each foot."""
         if self.spring:
             return {
-                f"{k:g} N·m/deg": braced_calf(1.0 if self.calf is None else self.calf, k, self.rest_deg)
+                _spring_name(k): braced_calf(1.0 if self.calf is None else self.calf, k, self.rest_deg)
                 for k in self.spring
             }
         return named_feet(self.foot)
