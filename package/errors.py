@@ -54,7 +54,9 @@ def require_within(name: str, value: object, allowed: tuple[float, float], unit:
     low, high = allowed
     number = as_float(value)
     if not low <= number <= high:
-        given = quoted(value) if isnan(number) else f"{number:.4g}"
+        rounded = f"{number:.4g}"
+        reads_allowed = low <= float(rounded) <= high
+        given = quoted(value) if isnan(number) else repr(number) if reads_allowed else rounded
         raise SpringfootError(f"{name} must be in [{low:g}, {high:g}] {unit}".rstrip() + f", got {given}")
     return number
 

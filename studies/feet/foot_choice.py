@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from math import ceil
 from os.path import isfile, realpath
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
@@ -23,12 +24,13 @@ from springfoot.agents.policies import SHIPPED, PolicyFunction
 from springfoot.arrays import NDArray
 from springfoot.envs import BipedSettings
 from springfoot.envs.settings import FootSetting, body_of, foot_setting, settings_from
-from springfoot.errors import SpringfootError, require_number
+from springfoot.errors import SpringfootError, require_number, require_within
 from springfoot.evaluation.numbers import Gait, effort_numbers, measure
 from springfoot.evaluation.page import foot_words, write_page
 from springfoot.evaluation.recording import WARM_UP, Recording, record_feet
 from springfoot.evaluation.report import STYLE
 from springfoot.files.markdown import MISSING, table, text_of
+from springfoot.gait.plan import PLAN_SPEED_RANGE
 
 from ..base.flags import read_foot_flag
 from ..base.study import Answer, OnProgress, WalkingStudy
@@ -46,6 +48,8 @@ SIDES_OF = {"left": ("left_foot",), "right": ("right_foot",), "both": ("left_foo
 """Side -> settings of its feet."""
 OTHER_SPEED = 0.15
 """How much slower the second walk is asked for, as a share: walks with hindrances are slower than asked for."""
+LEAST_SPEED = ceil(100.0 * PLAN_SPEED_RANGE[0] / (1.0 - OTHER_SPEED)) / 100.0
+"""Least speed to ask for [m/s], rounded up: the slower walk is planned too."""
 PRICE_NAMES = dict(zip(TWO_PRICES, ("fibre work", "effort"), strict=True))
 """Column of a price -> its name."""
 WHICH_PRICE = "Where the two differ, follow fibre work: its changes are held against people's, effort's are not."
@@ -127,14 +131,14 @@ class FootChoice(WalkingStudy):
     mass: float = 63.0
     """Mass of the body [kg]."""
     speed: float = 1.2
-    """Speed that is asked for [m/s]."""
+    """Speed that is asked for, 0.48 to 2 [m/s]; in the slower walk 15 % less."""
     side: Literal["left", "right", "both"] = "both"
     """Side on which the springs or feet are worn; the other foot is sound."""
     calf: float | None = None
     """Strength of the calf beside the springs, as a share of a sound one's, whose largest moment is 0.19 x body weight
     x height in the simulation and 0.10 x in the price; 0.1 to 0.6, None for a sound calf."""
     spring: tuple[float, ...] = ()
-    """Stiffness of orthoses at the ankle, at rest at --rest-deg [N m/deg]; 0 is a slack one."""
+    """Stiffness of orthoses at the ankle, 0 to 17.45 [N m/deg], at rest at --rest-deg; 0 is a slack one."""
     rest_deg: float = 0.0
     """Rest angle of the orthoses, dorsiflexion positive [deg]."""
     foot: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="FOOT")] = ()
@@ -146,7 +150,7 @@ class FootChoice(WalkingStudy):
     episodes: int = 5
     """Episodes of each person on each foot, undisturbed, and as many pushed."""
     seconds: float = 12.0
-    """Length of each episode."""
+    """Length of each episode, 6 or more [s]."""
 
     QUICK: ClassVar[Mapping[str, Any]] = {"persons": ("learned",), "episodes": 1, "seconds": 6.0}
     REPEATABLE: ClassVar[Collection[str]] = frozenset({"--foot"})
@@ -154,6 +158,7 @@ class FootChoice(WalkingStudy):
     def check(self) -> None:
         """Refuse feet that are missing, too many or alike, and numbers out of range."""
         super().check()
+        require_within("speed", self.speed, (LEAST_SPEED, PLAN_SPEED_RANGE[1]), "m/s")
         require_number("seconds", self.seconds, LEAST_SECONDS, unit="s")
         require_number("push_newton", self.push_newton, 0.0, unit="N")
         if bool(self.spring) == bool(self.foot):
@@ -190,7 +195,7 @@ class FootChoice(WalkingStudy):
         persons = [person_and_settings(name, given) for name in self.persons]
         walks, slower, pushed = (
             [self._walk(*person, progress, **changed) for person in persons]
-            for changed in ({}, {"speed": self._other_speed}, {"push_newton": self.push_newton})
+            for changed in ({}, {"speed": self.other_speed}, {"push_newton": self.push_newton})
         )
         rows = []
         for person, *own in zip(self.persons, walks, slower, pushed, strict=True):
@@ -218,7 +223,7 @@ class FootChoice(WalkingStudy):
         return Answer(text=self._text(names, rows, prices, speed, where), files=files)
 
     @property
-    def _other_speed(self) -> float:
+    def other_speed(self) -> float:
         """Return the second commanded speed [m/s]."""
         return self.speed * (1.0 - OTHER_SPEED)
 
@@ -325,7 +330,7 @@ class FootChoice(WalkingStudy):
         return (
             f"{self.height:g} m, {self.mass:g} kg{calf}, on {worn}, asked for {self.speed:g} m/s. "
             f"Persons: {', '.join(self.persons)}. Each walks on each foot {self.what_ran}, as much at "
-            f"{self._other_speed:.3g} m/s, and as much pushed by ±{self.push_newton:g} N. {prices}"
+            f"{self.other_speed:.3g} m/s, and as much pushed by ±{self.push_newton:g} N. {prices}"
             f"{apart} A foot on which somebody falls or does not reach the speed has no price. "
             "Push-off, of ankle and toe, is of the side that wears the foot; the largest 10 ms of force "
             "in a stride and moments are of the other side, the left one if both wear it."

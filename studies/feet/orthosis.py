@@ -9,6 +9,7 @@ best. Mass is no case: with every device scaled alike it is an identity.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import floor
 from typing import Any, ClassVar
 
 import numpy as np
@@ -20,8 +21,8 @@ from .spring_map import SpringMap
 
 PER_DEG = 180.0 / np.pi
 """N m/rad in 1 N m/deg."""
-MOST_SPRING = 1000.0 / PER_DEG
-"""Largest stiffness of an orthosis [N m/deg], that of the setting."""
+MOST_SPRING = floor(100.0 * 1000.0 / PER_DEG) / 100.0
+"""Largest stiffness of an orthosis [N m/deg]: that of the setting, 1000 N m/rad, rounded down, as messages print it."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -33,3 +33,9 @@ def test_the_ends_are_allowed_unless_it_must_be_above():
     assert require_number("gain", 0.0, 0.0) == 0.0 and require_number("gain", 2, 0.0, 2.0, above=True) == 2.0
     with pytest.raises(SpringfootError, match=r"gain must be a finite number > 0, got 0"):
         require_number("gain", 0.0, 0.0, above=True)
+
+
+@pytest.mark.parametrize(("value", "told"), [(2.00001, "2.00001"), (0.399996, "0.399996"), (2.12345, "2.123")])
+def test_a_number_just_beyond_an_end_does_not_read_as_allowed(value, told):
+    with pytest.raises(SpringfootError, match=rf"^speed must be in \[0.4, 2\] m/s, got {told}$"):
+        CHECKS["within"](value)

@@ -6,8 +6,21 @@ import numpy as np
 import pytest
 
 from springfoot.cli.main import main
+from springfoot.command_line import field_help
+from springfoot.envs.settings import settings_from
 from springfoot.errors import SpringfootError
-from springfoot.studies.feet.foot_choice import PRICE_NAMES, named_feet, price_cells, price_figure
+from springfoot.gait.plan import PLAN_SPEED_RANGE
+from springfoot.studies.feet.foot_choice import (
+    LEAST_SECONDS,
+    LEAST_SPEED,
+    OTHER_SPEED,
+    PRICE_NAMES,
+    FootChoice,
+    named_feet,
+    price_cells,
+    price_figure,
+)
+from springfoot.studies.feet.orthosis import MOST_SPRING
 
 QUICK = ["feet", "--quick", "--threads", "1"]
 
@@ -76,7 +89,9 @@ def test_what_is_said_follows_from_prices_csv(tmp_path, capsys):
         (["--foot", "rigid", "--foot", "none.csv"], "none.csv"),
         (["--spring", "0", "2", "--calf", "2"], "error: calf must be in [0.1, 0.6] (of the sound leg), got 2"),
         (["--spring", "0", "2", "--rest-deg", "40"], "error: rest_deg must be in [-30, 30] deg, got 40"),
-        (["--spring", "0", "-1"], "spring must be in [0, 17.4533] N m/deg, got -1"),
+        (["--spring", "0", "-1"], "spring must be in [0, 17.45] N m/deg, got -1"),
+        (["--spring", "0", "17.4533"], "spring must be in [0, 17.45] N m/deg, got 17.4533"),
+        (["--spring", "0", "2", "--speed", "0.4"], "error: speed must be in [0.48, 2] m/s, got 0.4"),
         (["--spring", "0", "2", "--quick", "--episodes", "-1"], "episodes must be"),
         (["--spring", "0", "2", "--persons", "pretrained"], "pretrained moves no person"),
         (["--spring", "0", "2", "--spring", "4"], "--spring is given twice"),
@@ -91,6 +106,19 @@ def test_bad_input_is_one_line(words, error, tmp_path, monkeypatch, capsys):
     told = capsys.readouterr().err
     assert code == 2 and error in told and told.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
+
+
+def test_ranges_of_the_help_are_those_that_are_refused_beyond():
+    told = field_help(FootChoice)
+    assert f"0 to {MOST_SPRING:g} [N m/deg]" in told["spring"]
+    assert (
+        f"{LEAST_SPEED:g} to {PLAN_SPEED_RANGE[1]:g} [m/s]; in the slower walk {100 * OTHER_SPEED:g} %" in told["speed"]
+    )
+    assert f"{LEAST_SECONDS:g} or more [s]" in told["seconds"]
+    for spring, speed in ((MOST_SPRING, LEAST_SPEED), (0.1, PLAN_SPEED_RANGE[1])):
+        choice = FootChoice(spring=(0.0, spring), speed=speed, seconds=LEAST_SECONDS)
+        choice.check()
+        settings_from(speed=choice.other_speed, left_foot=choice.feet[f"{spring:g} N·m/deg"])
 
 
 def test_feet_have_their_words_or_the_name_of_their_file(tmp_path):
