@@ -94,6 +94,13 @@ class Study:
         return 1 if answer.failed else 0
 
 
+def episodes_words(episodes: int, seconds: float, seed: int) -> str:
+    """Return number, length [s] and seeds of episodes in words; the first has the seed `seed`."""
+    if episodes == 1:
+        return f"1 episode × {seconds:g} s, seed {seed}"
+    return f"{episodes} episodes × {seconds:g} s, seeds {seed}–{seed + episodes - 1}"
+
+
 def without_places(command: str) -> str:
     """Return a command line without the flags that name the folders and files it writes, and their values."""
     words = shlex.split(command)
@@ -142,7 +149,7 @@ class WalkingStudy(Study):
     @property
     def what_ran(self) -> str:
         """Return number, length and seeds of each row's episodes, in words."""
-        return f"{self.episodes} episodes × {self.seconds:g} s, seeds {self.seed}–{self.seed + self.episodes - 1}"
+        return episodes_words(self.episodes, self.seconds, self.seed)
 
     @property
     def walked(self) -> dict[str, Any]:

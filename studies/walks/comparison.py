@@ -27,7 +27,7 @@ from springfoot.gait.people import mean_sd
 from ..base.columns import OPEN_LOOP, WALK_COLUMNS, falls_text, rmse_text, walks_csv
 from ..base.flags import RecordedFlags, given
 from ..base.intervals import RESAMPLES, mean_interval, paired_p, share_interval
-from ..base.study import Answer, OnProgress, WalkingStudy
+from ..base.study import Answer, OnProgress, WalkingStudy, episodes_words
 from .laboratory import LABORATORY, laboratory_csv, laboratory_table
 
 PUSHES = (150.0, 200.0)
@@ -399,5 +399,4 @@ def what_ran(study: WalkingStudy, row: Row) -> str:
     if settings["push_newton"]:
         size = f"±{settings['push_newton']:g} N × {settings['push_seconds']:g} s"
         pushes = f"pushes {size}, one in every {settings['push_interval']:g} s"
-    last = study.seed + study.episodes - 1
-    return f"{study.episodes} episodes × {settings['episode_seconds']:g} s, seeds {study.seed}–{last}, {pushes}."
+    return f"{episodes_words(study.episodes, settings['episode_seconds'], study.seed)}, {pushes}."

@@ -30,6 +30,11 @@ class Counted(WalkingStudy):
         return Answer(text=text, files=files, failed=self.seed == 1)
 
 
+def test_episodes_are_told_with_their_seeds():
+    assert Counted(episodes=3, seconds=12.0, seed=4).what_ran == "3 episodes × 12 s, seeds 4–6"
+    assert Counted(episodes=1, seconds=6.5, seed=4).what_ran == "1 episode × 6.5 s, seed 4"
+
+
 def test_a_study_prints_its_answer_and_writes_its_report_and_files(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     study = Counted(command="springfoot study counted --out there")

@@ -186,7 +186,7 @@ def test_studies_run_as_a_command_and_leave_their_numbers(tmp_path):
     command = [sys.executable, "-c", "from springfoot.cli.main import main; main()", "study", *words]
     done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=tmp_path)
     assert "| falls | 0 | 0 | 0.0 ± 0.0 |" in done.stdout
-    assert "1 episodes × 4.5 s, seeds 0–0, no pushes." in done.stdout
+    assert "1 episode × 4.5 s, seed 0, no pushes." in done.stdout
     with (tmp_path / "runs" / "compare-1" / "compare.csv").open(encoding="utf-8", newline="") as file:
         first, second = csv.DictReader(file)
     assert first["policy"] == "schedule" and second["policy"] == "constant" and first["falls"] == "0"
