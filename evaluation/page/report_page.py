@@ -13,6 +13,7 @@ from typing import Any
 
 from springfoot.envs.settings.feet import FootSetting
 from springfoot.envs.settings.settings import BipedSettings, settings_from
+from springfoot.files.markdown import html_of
 from springfoot.files.provenance import versions_and_commit
 
 from ..numbers.criteria import (
@@ -43,6 +44,7 @@ def write_page(
     walks: Sequence[tuple[Recording, Gait]],
     command: str = "",
     words_of: Callable[[FootSetting], str] | None = None,
+    introduction: str = "",
 ) -> None:
     """Write report.html: one page of one or several evaluated policies.
 
@@ -51,6 +53,7 @@ def write_page(
         walks: recording and measured gait of each policy.
         command: command line that made the page, which it shows; empty for none.
         words_of: function that puts a foot into words, `foot_words` by default.
+        introduction: Markdown that stands above the walks, as `html_of` reads it; empty for none.
     """
     _, first = walks[0]
     own = first.metrics["environment"]["human"] is not None
@@ -64,11 +67,19 @@ def write_page(
     spoken = [spoken_verdict(gait.metrics, leg_numbers(gait.tally), words_of) for _, gait in walks]
     blocks = {
         "ORIGIN": f"{date.today():%-d %B %Y}. Grey: {escape(data['policies'][0]['people'])}.",
+        "INTRODUCTION": _introduction(introduction),
         "WHO": "\n".join(_walker_line(index, gait.metrics, spoken[index]) for index, (_, gait) in enumerate(walks)),
         "VERDICT": "\n".join(_verdict(index, gait.metrics, spoken[index]) for index, (_, gait) in enumerate(walks)),
         "DATA": as_json(data),
     }
     path.write_text(filled("page.html", blocks), encoding="utf-8")
+
+
+def _introduction(text: str) -> str:
+    """Return the HTML of the introduction above the walks, from Markdown; empty without one."""
+    if not text:
+        return ""
+    return f'<section id="answer" class="wide" tabindex="0" aria-label="Answer">{html_of(text)}</section>'
 
 
 def _leg_rows(recording: Recording, gait: Gait) -> list[tuple[str, ...]]:

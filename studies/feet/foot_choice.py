@@ -33,7 +33,7 @@ from springfoot.files.markdown import MISSING, table, text_of
 from springfoot.gait.plan import PLAN_SPEED_RANGE
 
 from ..base.flags import read_foot_flag
-from ..base.study import Answer, OnProgress, WalkingStudy
+from ..base.study import QUICK_NOTE, Answer, OnProgress, WalkingStudy
 from .adapting_persons import person_and_settings
 from .foot_numbers import numbers_of_feet
 from .orthosis import braced_calf
@@ -53,7 +53,9 @@ LEAST_SPEED = ceil(100.0 * PLAN_SPEED_RANGE[0] / (1.0 - OTHER_SPEED)) / 100.0
 PRICE_NAMES = dict(zip(TWO_PRICES, ("fibre work", "effort"), strict=True))
 """Column of a price -> its name."""
 WHICH_PRICE = "Where the two differ, follow fibre work: its changes are held against people's, effort's are not."
-CANNOT_SAY = """- It is a body in a plane: nothing here is about comfort, pain, or balance to the side.
+LIMITS = """What this cannot say:
+
+- It is a body in a plane: nothing here is about comfort, pain, or balance to the side.
 - The person has adapted to all feet at once; one who wears a single foot for weeks may walk cheaper on it.
 - Read differences, not the price itself. A missing ankle comes out cheaper here than a sound one; people pay more."""
 """Limits of the model."""
@@ -213,19 +215,36 @@ class FootChoice(WalkingStudy):
             for price in TWO_PRICES
         }
         shown = [(walk.recording, walk.gait) for walk in walks[0]]
+        where = comparison(self.speed, speed, dict(zip(names, walked, strict=True)), prices[TWO_PRICES[0]])
+        answer = self._answer(names, rows, prices, where)
+        first = next(iter(_priced(names, prices[TWO_PRICES[0]])), None)
+        parts = [answer, self._how(first, speed), LIMITS, "![Price of the walk on each foot](feet.png)"]
         files = {
             "feet.csv": rows_csv(rows),
             "prices.csv": rows_csv(self._price_rows(prices, speed)),
             "feet.png": lambda path: _draw(path, names, self.spring, prices),
-            "report.html": partial(write_page, walks=shown, command=self.command, words_of=self._words_of()),
+            "report.html": partial(
+                write_page,
+                walks=shown,
+                command=self.command,
+                words_of=self._words_of(),
+                introduction=self.introduction(answer),
+            ),
         }
-        where = comparison(self.speed, speed, dict(zip(names, walked, strict=True)), prices[TWO_PRICES[0]])
-        return Answer(text=self._text(names, rows, prices, speed, where), files=files)
+        return Answer(text="\n\n".join(parts), files=files)
 
     @property
     def other_speed(self) -> float:
         """Return the second commanded speed [m/s]."""
         return self.speed * (1.0 - OTHER_SPEED)
+
+    def introduction(self, answer: str) -> str:
+        """Return Markdown to stand above the walks of report.html: the `answer` over all persons, what it cannot say,
+        and whose walks they are."""
+        first, *others = self.persons
+        whose = f"{first}, the first of {len(self.persons)} persons" if others else f"{first}, the one person"
+        below = f"Curves and verdicts below: {whose}."
+        return "\n\n".join([*([QUICK_NOTE] if self.quick else []), answer, LIMITS, below])
 
     def _walk(
         self, act: PolicyFunction, settings: BipedSettings, progress: OnProgress, **changed: float
@@ -261,15 +280,11 @@ class FootChoice(WalkingStudy):
         springs = {str(settings_from(left_foot=foot).left_foot): name + beside for name, foot in self.feet.items()}
         return lambda foot: springs.get(str(foot)) or foot_words(foot)
 
-    def _text(
-        self,
-        names: Sequence[str],
-        rows: Sequence[Row],
-        prices: Mapping[str, Sequence[NDArray | None]],
-        speed: float,
-        where: str,
+    def _answer(
+        self, names: Sequence[str], rows: Sequence[Row], prices: Mapping[str, Sequence[NDArray | None]], where: str
     ) -> str:
-        """Return the report; `where` tells the walked `speed` [m/s] of the comparison, and feet without a price."""
+        """Return the sentences on the feet and the table; `where` tells the speed of the comparison, and feet without a
+        price."""
         priced = {price: _priced(names, of_feet) for price, of_feet in prices.items()}
         first = next(iter(priced[TWO_PRICES[0]]), None)
         lines = []
@@ -298,15 +313,7 @@ class FootChoice(WalkingStudy):
         if first:
             fibre_work, effort = (verdict(words, priced[price]) for price, words in PRICE_NAMES.items())
             answer = f"**{where} {fibre_work}** {effort} {WHICH_PRICE}"
-        return "\n\n".join(
-            [
-                answer,
-                table(head, lines),
-                self._how(first, speed),
-                f"What this cannot say:\n\n{CANNOT_SAY}",
-                "![Price of the walk on each foot](feet.png)",
-            ]
-        )
+        return f"{answer}\n\n{table(head, lines)}"
 
     def _how(self, first: str | None, speed: float) -> str:
         """Return the paragraph on how the table was made: prices at a walked `speed` [m/s], changes against the foot

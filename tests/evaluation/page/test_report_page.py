@@ -257,6 +257,16 @@ def test_a_name_is_text_and_nothing_else(tmp_path):
     assert reader.data["policies"][0]["name"].startswith("</script><img") and "</script><img" in " ".join(reader.said)
 
 
+def test_an_introduction_stands_above_the_walks_and_is_text_alone(walk, tmp_path):
+    words = '**Least with <img src=x onerror="alert(1)">.**\n\n- It is a body in a plane.'
+    write_page(tmp_path / "report.html", [walk], introduction=words)
+    text = (tmp_path / "report.html").read_text(encoding="utf-8")
+    reader = Reader(text)
+    said = " ".join(reader.said)
+    assert reader.loads == ["data:,"] and 'Least with <img src=x onerror="alert(1)">.' in said
+    assert said.index("springfoot report") < said.index("It is a body in a plane.") < said.index("Never fell")
+
+
 @pytest.mark.slow
 def test_several_policies_have_a_folder_each_and_one_page(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)

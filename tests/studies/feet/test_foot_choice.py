@@ -9,10 +9,12 @@ from springfoot.cli.main import main
 from springfoot.command_line import field_help
 from springfoot.envs.settings import settings_from
 from springfoot.errors import SpringfootError
+from springfoot.files.markdown import html_of
 from springfoot.gait.plan import PLAN_SPEED_RANGE
 from springfoot.studies.feet.foot_choice import (
     LEAST_SECONDS,
     LEAST_SPEED,
+    LIMITS,
     OTHER_SPEED,
     PRICE_NAMES,
     FootChoice,
@@ -49,6 +51,7 @@ def test_springs_have_the_numbers_of_the_study_of_orthoses(tmp_path, capsys):
     assert "What this cannot say" in text and "the nearest to the asked speed that all walk" in text
     page = (tmp_path / "feet" / "report.html").read_text(encoding="utf-8")
     assert all(page.count(name) > 1 for name in feet)  # a tab for each foot
+    assert html_of(text[text.index("**") : text.index("\n\n1.7 m, 63 kg")]) in page  # the sentences and the table
     assert (tmp_path / "feet" / "feet.png").stat().st_size > 10_000
 
 
@@ -146,3 +149,13 @@ def test_a_drawing_without_a_price_says_so():
     for of_feet, words in (([prices, None], []), ([None, None], ["no foot has a price"])):
         figure = price_figure(["0", "4"], (0.0, 4.0), dict.fromkeys(PRICE_NAMES, of_feet))
         assert [[text.get_text() for text in ax.texts] for ax in figure.axes] == [words, words]
+
+
+@pytest.mark.parametrize(
+    ("persons", "whose"),
+    [(("learned", "learned-3"), "learned, the first of 2 persons"), (("learned-2",), "learned-2, the one person")],
+)
+def test_the_page_begins_with_the_answer_over_all_persons_and_says_whose_curves_it_shows(persons, whose):
+    said = FootChoice(spring=(0.0, 2.0), persons=persons).introduction("**Least with 2.**")
+    assert said == f"**Least with 2.**\n\n{LIMITS}\n\nCurves and verdicts below: {whose}."
+    assert LIMITS.count("\n- ") == 3
