@@ -155,14 +155,22 @@ def walker_words(settings: BipedSettings, words_of: Callable[[FootSetting], str]
 
     `words_of` puts a foot into words, `foot_words` by default.
     """
+    return ", ".join(walker_parts(settings, words_of))
+
+
+def walker_parts(settings: BipedSettings, words_of: Callable[[FootSetting], str] | None = None) -> list[str]:
+    """Return the parts of `walker_words`: height, mass, feet, and a learned person.
+
+    `words_of` puts a foot into words, `foot_words` by default.
+    """
     height, mass = (
         f"{bounds[0]:g} to {bounds[1]:g}" if bounds else f"{value:g}"
         for bounds, value in ((settings.height_range, settings.height), (settings.mass_range, settings.mass))
     )
     left, right = map(words_of or foot_words, (settings.left_foot, settings.right_foot))
     feet = f"both feet {left}" if left == right else f"left foot {left}, right foot {right}"
-    person = "" if settings.person == "tuned" else f", person {printable(Path(settings.person).stem)}"
-    return f"{height} m, {mass} kg, {feet}{person}"
+    person = [] if settings.person == "tuned" else [f"person {printable(Path(settings.person).stem)}"]
+    return [f"{height} m", f"{mass} kg", feet, *person]
 
 
 def _plain(name: str) -> str:

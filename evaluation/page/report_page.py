@@ -30,7 +30,7 @@ from ..numbers.per_leg import leg_numbers
 from ..recording.recording import Recording
 from ..report.gait_table import leg_numbers_beside_people, people_metrics, table_rows
 from .page_data import policy_data
-from .page_figure import walker_words
+from .page_figure import walker_parts
 from .template import as_json, filled
 
 PAGE_PACKAGES = ("springfoot", "mujoco", "numpy")
@@ -68,7 +68,7 @@ def write_page(
     blocks = {
         "ORIGIN": f"{date.today():%-d %B %Y}. Grey: {escape(data['policies'][0]['people'])}.",
         "INTRODUCTION": _introduction(introduction),
-        "WHO": "\n".join(_walker_line(index, gait.metrics, spoken[index]) for index, (_, gait) in enumerate(walks)),
+        "WHO": "\n".join(_walker_lines([gait.metrics for _, gait in walks], spoken, words_of)),
         "VERDICT": "\n".join(_verdict(index, gait.metrics, spoken[index]) for index, (_, gait) in enumerate(walks)),
         "DATA": as_json(data),
     }
@@ -115,14 +115,42 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7
 """Colours of the policies, in their order; as in page.html."""
 
 
-def _walker_line(index: int, metrics: dict[str, Any], spoken: Mapping[str, str]) -> str:
-    """Return the HTML of the line on the walker of policy number `index`: the `spoken` words on it and its falls."""
-    colour = COLOURS[index % len(COLOURS)]
-    words = f"{spoken['Walker']} {spoken['Falls']}"
-    return (
-        f'<li class="name" data-of="{index}" style="border-color:{colour}">'
-        f"<strong>{escape(metrics['policy'])}</strong>: {escape(words)}</li>"
-    )
+def _walker_lines(
+    metrics: Sequence[dict[str, Any]],
+    spoken: Sequence[Mapping[str, str]],
+    words_of: Callable[[FootSetting], str] | None,
+) -> list[str]:
+    """Return the HTML of a line on each policy's walker and its falls, after a line on what several have in common.
+
+    Args:
+        metrics: content of metrics.json of each policy.
+        spoken: verdict on each, of `spoken_verdict`.
+        words_of: as in `write_page`.
+    """
+    walkers = [_walker_parts(each, words_of) for each in metrics]
+    falls = [verdict["Falls"] for verdict in spoken]
+    several = len(walkers) > 1
+    common = [part for part in walkers[0] if several and all(part in parts for parts in walkers)]
+    common_falls = falls[0] if several and len(set(falls)) == 1 else ""
+    lines = [f"<li>All: {escape(_sentences(common, common_falls))}</li>"] if common or common_falls else []
+    for index, (each, parts, own_falls) in enumerate(zip(metrics, walkers, falls, strict=True)):
+        words = _sentences([part for part in parts if part not in common], "" if common_falls else own_falls)
+        lines.append(
+            f'<li class="name" data-of="{index}" style="border-color:{COLOURS[index % len(COLOURS)]}">'
+            f"<strong>{escape(each['policy'])}</strong>{escape(f': {words}' if words else '')}</li>"
+        )
+    return lines
+
+
+def _sentences(parts: Sequence[str], falls: str) -> str:
+    """Return the parts of a walker as a sentence, if there are any, and the one on its `falls`."""
+    return f"{', '.join(parts)}{'. ' if parts else ''}{falls}".strip()
+
+
+def _walker_parts(metrics: dict[str, Any], words_of: Callable[[FootSetting], str] | None) -> list[str]:
+    """Return words on the walker of a policy: those of `walker_parts`, its commanded speed and its target."""
+    settings = settings_from(**metrics["environment"])
+    return [*walker_parts(settings, words_of), f"{settings.speed:g} m/s", _guide_words(settings)]
 
 
 def _verdict(index: int, metrics: dict[str, Any], spoken: Mapping[str, str]) -> str:
@@ -170,7 +198,7 @@ def spoken_verdict(
     work = metrics["joint_work_J_kg"]["ankle"]
     verdict = {
         "Falls": f"{falls_text} Mean length {metrics['seconds_mean']:.1f} s.",
-        "Walker": f"{walker_words(settings, words_of)}, {environment['speed']:g} m/s, {_guide_words(settings)}.",
+        "Walker": f"{', '.join(_walker_parts(metrics, words_of))}.",
     }
     if falls == episodes:
         verdict["Walk"] = "None: every episode ends in a fall. All numbers are of the time before."

@@ -167,6 +167,8 @@ class FootChoice(WalkingStudy):
             raise SpringfootError(
                 "give either --spring or --foot, such as --spring 0 2 4 6 or --foot intact --foot rigid"
             )
+        if not self.persons:
+            raise SpringfootError("--persons: give one person at least, such as learned")
         _refuse_repeats("--spring", [_spring_name(k) for k in self.spring])
         _refuse_repeats("--persons", [name if name in SHIPPED else realpath(name) for name in self.persons])
         if self.foot and (self.calf is not None or self.rest_deg):

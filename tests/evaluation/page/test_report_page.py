@@ -1,5 +1,7 @@
 """report.html: what it says, what it draws, and what it does in a real browser."""
 
+import copy
+import dataclasses
 import json
 import re
 from html.parser import HTMLParser
@@ -189,6 +191,32 @@ def test_a_foot_in_words(setting, words):
 )
 def test_a_walker_in_words(settings, words):
     assert walker_words(settings_from(**settings)) == words
+
+
+def who(path):
+    """Return the lines on the walkers of a page."""
+    (part,) = re.findall(r'<ul id="who">(.*?)</ul>', path.read_text(encoding="utf-8"), re.DOTALL)
+    return [re.sub(r"<[^>]+>", "", line) for line in re.findall(r"<li.*?</li>", part)]
+
+
+def test_walkers_are_told_by_what_differs_after_what_they_have_in_common(walk, tmp_path):
+    recording, gait = walk
+    falls = "Never fell in 2 episodes. Mean length 8.0 s."
+    write_page(tmp_path / "one.html", [walk])
+    assert who(tmp_path / "one.html") == [
+        f"schedule: 1.7 m, 63 kg, both feet intact, 1.2 m/s, after people&#x27;s mean walk. {falls}"
+    ]
+    rigid = dataclasses.replace(gait, metrics=copy.deepcopy(gait.metrics))
+    rigid.metrics["environment"]["left_foot"] = "rigid"
+    write_page(tmp_path / "two.html", [walk, (recording, rigid)])
+    assert who(tmp_path / "two.html") == [
+        f"All: 1.7 m, 63 kg, 1.2 m/s, after people&#x27;s mean walk. {falls}",
+        "schedule: both feet intact.",
+        "schedule: left foot rigid, right foot intact.",
+    ]
+    rigid.metrics["falls"] = 1
+    write_page(tmp_path / "fall.html", [walk, (recording, rigid)])
+    assert [line.count("ell in") for line in who(tmp_path / "fall.html")] == [0, 1, 1]
 
 
 def test_the_verdict_is_told_in_words(walk):

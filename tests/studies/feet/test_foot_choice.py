@@ -82,6 +82,7 @@ def test_what_is_said_follows_from_prices_csv(tmp_path, capsys):
         (["--spring", "0", "2", "2", "4"], "error: --spring: 2 N·m/deg is given 2 times; give each once"),
         (["--spring", "4", "4.0000001"], "error: --spring: 4 N·m/deg is given 2 times; give each once"),
         (["--spring", "0", "-0"], "error: --spring: 0 N·m/deg is given 2 times; give each once"),
+        (["--spring", "0", "2", "--persons"], "error: --persons: give one person at least, such as learned"),
         (["--spring", "0", "2", "--persons", "learned", "learned"], "--persons: learned is given 2 times; give each"),
         (["--spring", "0", "2", "--persons", "runs/a", "learned", "runs/a/"], "runs/a is given 2 times; give each"),
         (["--foot", "rigid", "--foot", "rigid"], "give 2 to 8 different springs or feet, got 1"),
