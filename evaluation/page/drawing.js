@@ -69,13 +69,18 @@ const lines = which => which.flatMap((p, i) => (p.legs || [p]).map((own, leg) =>
 // Which policy alone is shown, by its number; null for all. Whatever belongs to one has data-of.
 let only = null;
 const isShown = p => only === null || p.of === only;
-const short = value => value === null || value === undefined ? "–" : String(+value.toPrecision(3));
+// A function that tells the numbers of a panel in one precision: three digits of the largest of `all`.
+const teller = all => {
+  const largest = Math.max(...all.map(Math.abs)), digits = largest > LEAST_SPAN ? Math.max(0, 2 - Math.floor(Math.log10(largest))) : 0;
+  return value => value === null || value === undefined ? "–" : value.toFixed(digits);
+};
 function panel(parent, which) {
   const drawn = lines(which);
   const all = [...drawn, ...which].flatMap(p => [p.mean, p.people || [], p.plan || []].flatMap((mean, k) => {
     const sd = [p.sd, p.people_sd || [], []][k];
     return known(mean.flatMap((m, j) => m === null ? [] : [m - (sd[j] || 0), m + (sd[j] || 0)]));
   })).concat(which[0].zero ? [0] : []);
+  const short = teller(all), unit = which[0].unit.split(", ").pop();
   const axis = which[0].axis || "stride"; // or the step, or each leg's own phase
   const { svg, X, Y } = frame(parent, which[0].title, { stride: "% of the stride", step: "% of the step", leg: "% of the leg's phase" }[axis], which[0].unit, [0, 100], all);
   if (axis === "stride") policies.flatMap((p, i) => [[p.toe_off[0], colour(i), { "data-of": i }], ...(i ? [] : [[p.toe_off[1], "var(--people)", {}]])]).forEach(([at, shade, of]) => {
@@ -101,6 +106,7 @@ function panel(parent, which) {
     if (begin) make(note, "span", begin);
     drawn.forEach((p, i) => { if (isShown(p)) make(note, "span", p.side + texts[i], { class: "own", style: `border-color:${p.shade}${Math.round(255 * p.opacity).toString(16)}` }); });
     if (end) make(note, "span", end);
+    make(note, "span", unit);
   };
   let following = () => {};
   followers.push(where => {

@@ -1,6 +1,7 @@
 """report.html in a real browser, Debian's Chromium by Playwright, from file://, as wide as a desk's and a phone's."""
 
 import csv
+import re
 from dataclasses import replace
 
 import imageio.v3 as iio
@@ -125,12 +126,19 @@ def test_the_first_screen_has_the_walker_its_falls_and_curves(chromium, page, tm
 
 @pytest.fixture(scope="module")
 def feet(tmp_path_factory):
-    """A page of one walk under six names."""
+    """A page of one walk under six names, said to be on six feet."""
     path = tmp_path_factory.mktemp("feet") / "report.html"
     recording, gait = walked("schedule")
-    names = [f"{stiffness} N·m/deg" for stiffness in (0, 2, 4, 6, 9, 12)]
-    walks = [(replace(recording, policy=name), gait) for name in names]
-    write_page(path, walks, words_of=lambda foot: "springs of the user's")
+    walks = []
+    for stiffness in (0, 2, 4, 6, 9, 12):
+        name = f"{stiffness} N·m/deg"
+        foot = {"kind": "weak", "strength": 0.25, "orthosis": {"ankle_stiffness": float(stiffness)}}
+        environment = gait.metrics["environment"] | {"left_foot": foot, "right_foot": foot}
+        metrics = gait.metrics | {"policy": name, "environment": environment}
+        settings = replace(recording.settings, left_foot=foot, right_foot=foot)
+        walks.append((replace(recording, policy=name, settings=settings), replace(gait, metrics=metrics)))
+    words = "springs of the user's, {:g} N·m/deg beside a calf of 25 %"
+    write_page(path, walks, words_of=lambda foot: words.format(foot.numbers["orthosis"]["ankle_stiffness"]))
     return path
 
 
@@ -158,6 +166,16 @@ def test_of_six_feet_one_is_shown_or_all_with_every_value(chromium, feet, width,
     tab.close()
 
 
+@pytest.mark.parametrize(("width", "height"), [(1280, 900), (390, 844)])
+def test_of_all_six_feet_a_curve_is_in_the_first_screen(chromium, feet, width, height):
+    tab, _, _ = opened(chromium, feet, width)
+    tab.select_option("#shown", label="all")
+    tab.evaluate("scrollTo(0, 0)")
+    box = tab.locator("svg[aria-label^='Thigh angle']").bounding_box()
+    assert box["y"] + 0.9 * box["height"] < height
+    tab.close()
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [1280, 390])
 def test_pointing_at_a_curve_reads_it(chromium, page, width, scheme):
@@ -171,9 +189,41 @@ def test_pointing_at_a_curve_reads_it(chromium, page, width, scheme):
     panel.hover(position={"x": left + 0.72 * (right - left), "y": box["height"] / 2})
     read = value.text_content()
     knee = tab.evaluate("policies[0].panels.find(p => p.title === 'Knee angle').mean[72]")
-    assert read.startswith("72 %: ") and f"{knee:.3g}" in read and "people" in read
+    people = tab.evaluate("policies[0].panels.find(p => p.title === 'Knee angle').people[72]")
+    assert read.startswith("72 %: ") and f"{knee:.1f}" in read and read.endswith(f"people {people:.1f}deg")
     tab.mouse.move(1, 1)
     assert value.text_content() == before and told == []
+    tab.close()
+
+
+def test_values_have_a_unit_and_one_precision(chromium, feet):
+    tab, _, _ = opened(chromium, feet, 1280)
+    panel = tab.locator("svg[aria-label^='Knee angle']")
+    panel.scroll_into_view_if_needed()
+    panel.hover()
+    read = tab.locator("figure", has=panel).locator(".value").inner_text().split("\n")
+    assert re.fullmatch(r"-?\d+\.\d ± \d+\.\d", read[1]) and re.fullmatch(r"people -?\d+\.\d", read[2])
+    assert read[3] == "deg"
+    assert tab.evaluate("[teller([-71, 3])(0.04), teller([0, 1.2])(0.5), teller([0, 520])(41.6), teller([])(0)]") == [
+        *("0.0", "0.50", "42", "0"),
+    ]
+    tab.close()
+
+
+def test_the_caption_explains_the_lines_that_are_shown_and_a_plan_where_one_is_drawn(chromium, feet):
+    tab, _, _ = opened(chromium, feet, 1280)
+    caption = tab.get_by_text("Lines and bands")
+    assert caption.inner_text().startswith("Lines and bands: mean ± SD over strides of 0 N·m/deg (solid). Grey: ")
+    tab.select_option("#shown", label="4 N·m/deg")
+    assert "of 4 N·m/deg (dotted). Grey" in caption.inner_text()
+    tab.select_option("#shown", label="all")
+    assert "0 N·m/deg (solid), 2 N·m/deg (dashed), 4 N·m/deg (dotted)" in caption.inner_text()
+    assert "Dotted upright lines: toe-off." in caption.inner_text() and "plan" not in caption.inner_text()
+    strokes = tab.locator(".toe-off").evaluate_all("lines => lines.map(line => line.getAttribute('stroke-dasharray'))")
+    assert set(strokes) == {"2 2"}  # as of the lines that are called dotted
+    with_plan = tab.locator("section", has=tab.locator(".plan"))
+    assert with_plan.count() == tab.get_by_text("Dotted: the plan.").count() == 1
+    assert with_plan.get_by_text("Dotted: the plan.").count() == 1
     tab.close()
 
 
