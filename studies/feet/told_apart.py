@@ -106,7 +106,7 @@ def without_price(speed: float, walked: NDArray | None) -> str:
         return "somebody falls"
     fastest = fastest_of_all(walked.mean(-1))
     if fastest < speed - TOLERANCE:
-        return f"too slow, {fastest:.2f} m/s at most"
+        return f"somebody is too slow, {fastest:.2f} m/s at most"
     return "somebody has no two walks around that speed"
 
 
@@ -138,7 +138,7 @@ def comparison(
     `walked` has by name of a foot an entry of those of `common_speed`, `prices` one price of each foot.
     """
     unknown = [
-        f"{name} ({without_price(speed, speeds)})"
+        f"{name}, as {without_price(speed, speeds)}"
         for (name, speeds), values in zip(walked.items(), prices, strict=True)
         if values is None
     ]
@@ -148,11 +148,11 @@ def comparison(
         if speeds is not None and values is not None
     ]
     if not compared:
-        return f"No foot has a price: {', '.join(unknown)}."
+        return f"No foot has a price: {'; '.join(unknown)}."
     short = sum(fastest < asked - TOLERANCE for fastest in compared)
     who = "no foot reaches" if short == len(compared) else "not every foot reaches"
     why = f", as {who} the asked {asked:g} m/s" if short else ""
-    without = f" Without a price: {', '.join(unknown)}." if unknown else ""
+    without = f" Without a price: {'; '.join(unknown)}." if unknown else ""
     return f"Compared at {speed:.2f} m/s walked{why}.{without}"
 
 
