@@ -53,7 +53,7 @@ LEAST_SPEED = ceil(100.0 * PLAN_SPEED_RANGE[0] / (1.0 - OTHER_SPEED)) / 100.0
 PRICE_NAMES = dict(zip(TWO_PRICES, ("fibre work", "effort"), strict=True))
 """Column of a price -> its name."""
 WHICH_PRICE = "Where the two differ, follow fibre work: its changes are held against people's, effort's are not."
-LIMITS = """What this cannot say:
+CANNOT_SAY = """What this cannot say:
 
 - It is a body in a plane: nothing here is about comfort, pain, or balance to the side.
 - The person has adapted to all feet at once; one who wears a single foot for weeks may walk cheaper on it.
@@ -220,7 +220,7 @@ class FootChoice(WalkingStudy):
         where = comparison(self.speed, speed, dict(zip(names, walked, strict=True)), prices[TWO_PRICES[0]])
         answer = self._answer(names, rows, prices, where)
         first = next(iter(_priced(names, prices[TWO_PRICES[0]])), None)
-        parts = [answer, self._how(first, speed), LIMITS, "![Price of the walk on each foot](feet.png)"]
+        parts = [answer, self._how(first, speed), CANNOT_SAY, "![Price of the walk on each foot](feet.png)"]
         files = {
             "feet.csv": rows_csv(rows),
             "prices.csv": rows_csv(self._price_rows(prices, speed)),
@@ -246,7 +246,7 @@ class FootChoice(WalkingStudy):
         first, *others = self.persons
         whose = f"{first}, the first of {len(self.persons)} persons" if others else f"{first}, the one person"
         below = f"Curves and verdicts below: {whose}."
-        return "\n\n".join([*([QUICK_NOTE] if self.quick else []), answer, LIMITS, below])
+        return "\n\n".join([*([QUICK_NOTE] if self.quick else []), answer, CANNOT_SAY, below])
 
     def _walk(
         self, act: PolicyFunction, settings: BipedSettings, progress: OnProgress, **changed: float

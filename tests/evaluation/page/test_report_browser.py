@@ -11,6 +11,7 @@ from springfoot.evaluation.numbers.metrics import measure
 from springfoot.evaluation.page.report_page import write_page
 from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.evaluation.recording.recording import record
+from springfoot.files.markdown import table
 
 CUT_OFF = """() => [...document.querySelectorAll("svg text")].filter(text => {
   const own = text.getBoundingClientRect(), around = text.ownerSVGElement.getBoundingClientRect();
@@ -122,6 +123,20 @@ def test_the_first_screen_has_the_walker_its_falls_and_curves(chromium, page, tm
         curve = tab.locator("svg[aria-label^='Thigh angle']").bounding_box()
         assert falls["y"] < 200 and body["y"] < 400 and curve["y"] + 0.9 * curve["height"] < height
         tab.close()
+
+
+@pytest.mark.parametrize("width", [1280, 390])
+def test_an_introduction_is_read_by_all_and_its_table_moves_within_the_page(chromium, tmp_path, width):
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright", reason="pip install axe-playwright-python")
+    wide = table(["foot", *(f"number {k}" for k in range(9))], [["none", *9 * ["−53 % (−55 to −51)"]]])
+    write_page(tmp_path / "report.html", [walked("schedule")], introduction=f"**Least with none.**\n\n{wide}\n\n- one")
+    tab, told, _ = opened(chromium, tmp_path / "report.html", width)
+    assert tab.evaluate("document.documentElement.scrollWidth <= document.documentElement.clientWidth")
+    assert tab.locator("#answer").evaluate("each => each.scrollWidth > each.clientWidth")
+    assert tab.locator("#answer").bounding_box()["y"] < tab.locator("#who").bounding_box()["y"]
+    faults = axe.Axe().run(tab).response["violations"]
+    tab.close()
+    assert [(fault["id"], fault["impact"]) for fault in faults] == [] and told == []
 
 
 @pytest.fixture(scope="module")

@@ -12,9 +12,9 @@ from springfoot.errors import SpringfootError
 from springfoot.files.markdown import html_of
 from springfoot.gait.plan import PLAN_SPEED_RANGE
 from springfoot.studies.feet.foot_choice import (
+    CANNOT_SAY,
     LEAST_SECONDS,
     LEAST_SPEED,
-    LIMITS,
     OTHER_SPEED,
     PRICE_NAMES,
     FootChoice,
@@ -158,5 +158,5 @@ def test_a_drawing_without_a_price_says_so():
 )
 def test_the_page_begins_with_the_answer_over_all_persons_and_says_whose_curves_it_shows(persons, whose):
     said = FootChoice(spring=(0.0, 2.0), persons=persons).introduction("**Least with 2.**")
-    assert said == f"**Least with 2.**\n\n{LIMITS}\n\nCurves and verdicts below: {whose}."
-    assert LIMITS.count("\n- ") == 3
+    assert said == f"**Least with 2.**\n\n{CANNOT_SAY}\n\nCurves and verdicts below: {whose}."
+    assert CANNOT_SAY.count("\n- ") == 3
