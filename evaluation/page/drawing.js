@@ -17,6 +17,7 @@ function make(parent, tag, text, attributes = {}) {
   parent.append(made);
   return made;
 }
+const NORM = DATA.norm || "people"; // whose curves are grey
 const known = values => values.filter(value => value !== null && value !== undefined);
 function ticks(low, high, about) {
   const rough = (high - low) / about, power = 10 ** Math.floor(Math.log10(rough));
@@ -126,10 +127,10 @@ function panel(parent, which) {
     if (k < 0 || k > 100) return;
     pointer.setAttribute("x1", X(k)); pointer.setAttribute("x2", X(k)); pointer.setAttribute("visibility", "visible");
     const spread = (mean, sd) => drawn.filter(isShown).length < 3 && sd !== null && sd !== undefined ? `${short(mean)} ± ${short(sd)}` : short(mean);
-    tell(`${k} %: `, drawn.map(p => spread(p.mean[k], p.sd[k])), first.people ? `people ${short(first.people[k])}` : "");
+    tell(`${k} %: `, drawn.map(p => spread(p.mean[k], p.sd[k])), first.people ? `${NORM} ${short(first.people[k])}` : "");
   });
   svg.addEventListener("pointerleave", () => { pointer.setAttribute("visibility", "hidden"); following(); });
-  const heads = ["percent", ...drawn.flatMap(p => [`${p.name} mean`, `${p.name} sd`]), ...(first.people ? ["people mean", "people sd"] : [])];
+  const heads = ["percent", ...drawn.flatMap(p => [`${p.name} mean`, `${p.name} sd`]), ...(first.people ? [`${NORM} mean`, `${NORM} sd`] : [])];
   savers(svg, which[0].title, [heads, ...PERCENT.map(k => [k, ...drawn.flatMap(p => [p.mean[k], p.sd[k]]), ...(first.people ? [first.people[k], first.people_sd[k]] : [])])]);
 }
 // Buttons below a drawing that save it as a picture, and its numbers as a table.
