@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from springfoot.agents import load_policy, train
+from springfoot.agents.policies.policy import Policy
 from springfoot.agents.training.config import PRESETS, TrainingConfig
 from springfoot.agents.training.returns import evaluate_returns
 from springfoot.agents.training.run_record import is_of_rllib, read_record
@@ -101,7 +102,8 @@ def test_a_mirrored_network_acts_and_values_alike_on_both_sides(tmp_path):
     policy = load_policy(tmp_path / "run" / "last.safetensors")
     environments = SegmentedFootBipedVector(4)
     mirror = mirror_of(environments.biped.observation_names, environments.biped.action_names)
-    assert policy.mirror is not None and policy.weights[-1].shape[0] == 2  # actions of the left leg
+    assert isinstance(policy, Policy) and policy.mirror is not None
+    assert policy.weights[-1].shape[0] == 2  # actions of the left leg
     rows = environments.reset(seed=3)[0]
     np.testing.assert_array_equal(policy(mirror.of(rows)), policy(rows)[:, mirror.action_index])
     mean, variance = rllib_training.observation_moments(config, mirror)
