@@ -170,6 +170,7 @@ class FootChoice(WalkingStudy):
         if not self.persons:
             raise SpringfootError("--persons: give one person at least, such as learned")
         _refuse_repeats("--spring", [_spring_name(k) for k in self.spring])
+        _refuse_repeats("--foot", self.foot)
         _refuse_repeats("--persons", [name if name in SHIPPED else realpath(name) for name in self.persons])
         if self.foot and (self.calf is not None or self.rest_deg):
             raise SpringfootError("--calf and --rest-deg go with --spring; a foot of --foot has numbers of its own")

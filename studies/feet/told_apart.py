@@ -48,8 +48,13 @@ class Difference:
 
         Of one person there is no interval.
         """
-        interval = f" ({_percent(self.low)} to {_percent(self.high)})" if self.persons > 1 else ""
-        return f"{_percent(self.mean)} %{interval}"
+        return self.to_digits(0)
+
+    def to_digits(self, digits: int) -> str:
+        """Return `text` to so many decimal digits of a percent."""
+        low, high = (_percent(end, digits) for end in (self.low, self.high))
+        interval = f" ({low} to {high})" if self.persons > 1 else ""
+        return f"{_percent(self.mean, digits)} %{interval}"
 
 
 def difference(prices: NDArray, others: NDArray) -> Difference:
@@ -106,7 +111,7 @@ def without_price(speed: float, walked: NDArray | None) -> str:
         return "somebody falls"
     fastest = fastest_of_all(walked.mean(-1))
     if fastest < speed - TOLERANCE:
-        return f"somebody is too slow, {fastest:.2f} m/s at most"
+        return f"one person walks {fastest:.2f} m/s at most"
     return "somebody has no two walks around that speed"
 
 
@@ -150,8 +155,8 @@ def comparison(
     if not compared:
         return f"No foot has a price: {'; '.join(unknown)}."
     short = sum(fastest < asked - TOLERANCE for fastest in compared)
-    who = "no foot reaches" if short == len(compared) else "not every foot reaches"
-    why = f", as {who} the asked {asked:g} m/s" if short else ""
+    where = "on no foot" if short == len(compared) else "not on every foot"
+    why = f", as {where} all persons reach the asked {asked:g} m/s" if short else ""
     without = f" Without a price: {'; '.join(unknown)}." if unknown else ""
     return f"Compared at {speed:.2f} m/s walked{why}.{without}"
 
@@ -180,7 +185,9 @@ def verdict(price: str, prices: Mapping[str, NDArray]) -> str:
     if dearer.pop(first, None):
         sentence += f": {difference(prices[least], prices[first]).text} against {first}"
     uncertain = [
-        f"{name}, {change.text}" for name, change in changes.items() if not (change.alike or change.told_apart)
+        f"{name}, {change.to_digits(1)}"  # tenths tell on which side of `GAP` an end lies
+        for name, change in changes.items()
+        if not (change.alike or change.told_apart)
     ]
     doubts = f" Uncertain against {least}: {'; '.join(uncertain)}." if uncertain else ""
     return f"{sentence}.{_against(least, dearer)}{doubts}"
@@ -192,10 +199,10 @@ def _against(least: str, changes: Mapping[str, Difference]) -> str:
     return f" Against {least}: {_list(told)}." if told else ""
 
 
-def _percent(share: float) -> str:
-    """Return a share in whole percent with its sign, 0 without one."""
-    percent = round(100.0 * share)
-    return f"{percent:+d}".replace("-", "−") if percent else "0"
+def _percent(share: float, digits: int = 0) -> str:
+    """Return a share in percent with its sign, 0 without one, to so many decimal `digits`."""
+    percent = round(100.0 * share, digits)
+    return f"{percent:+.{digits}f}".replace("-", "−") if percent else "0"
 
 
 def _list(words: Sequence[str]) -> str:

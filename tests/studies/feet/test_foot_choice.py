@@ -62,7 +62,7 @@ def test_what_is_said_follows_from_prices_csv(tmp_path, capsys):
     text = capsys.readouterr().out
     rows = read(tmp_path / "feet" / "prices.csv")
     (speed,) = {float(row["speed_m_s"]) for row in rows}
-    assert f"**Compared at {speed:.2f} m/s walked, as no foot reaches the asked 1.1 m/s." in text
+    assert f"**Compared at {speed:.2f} m/s walked, as on no foot all persons reach the asked 1.1 m/s." in text
     (line,) = (line for line in text.splitlines() if line.startswith("| 6 N·m/deg"))
     cells = [cell.strip() for cell in line.split("|")]
     for column, place in (("fibre_J_kg_m", 4), ("effort", 6)):
@@ -85,7 +85,7 @@ def test_what_is_said_follows_from_prices_csv(tmp_path, capsys):
         (["--spring", "0", "2", "--persons"], "error: --persons: give one person at least, such as learned"),
         (["--spring", "0", "2", "--persons", "learned", "learned"], "--persons: learned is given 2 times; give each"),
         (["--spring", "0", "2", "--persons", "runs/a", "learned", "runs/a/"], "runs/a is given 2 times; give each"),
-        (["--foot", "rigid", "--foot", "rigid"], "give 2 to 8 different springs or feet, got 1"),
+        (["--foot", "rigid", "--foot", "rigid"], "--foot: rigid is given 2 times; give each once"),
         (["--spring", *map(str, range(9))], "give 2 to 8 different springs or feet, got 9"),
         (["--foot", "rigid", "--foot", "intact", "--calf", "0.3"], "--calf and --rest-deg go with --spring"),
         (["--foot", "rigid", "--foot", "ridig"], "ridig"),

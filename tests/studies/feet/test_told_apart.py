@@ -64,7 +64,7 @@ def test_a_foot_of_which_persons_disagree_is_uncertain_and_not_alike():
     assert not change.told_apart and not change.alike
     assert verdict("fibre work", prices) == (
         "Fibre work is least with 4, alike (within 5 %) with 2. Against 4: 9 +13 %."
-        " Uncertain against 4: 12, +23 % (−9 to +55)."
+        " Uncertain against 4: 12, +23.0 % (−9.3 to +55.3)."
     )
 
 
@@ -118,8 +118,8 @@ def test_a_foot_too_slow_for_the_others_is_left_out_and_told_from_one_on_which_s
     priced = [values is not None and price_at(speed, values, 3.0 + values) is not None for values in walked]
     assert priced == [True, True, False, False, False]
     assert [without_price(speed, values) for values in walked[2:]] == [
-        "somebody is too slow, 0.90 m/s at most",
-        "somebody is too slow, 0.80 m/s at most",
+        "one person walks 0.90 m/s at most",
+        "one person walks 0.80 m/s at most",
         "somebody falls",
     ]
 
@@ -127,13 +127,13 @@ def test_a_foot_too_slow_for_the_others_is_left_out_and_told_from_one_on_which_s
 def test_the_comparison_names_its_speed_and_feet_without_a_price():
     prices = [np.ones((1, 2)), None, None]
     walked = {"none": WALKED, "15": WALKED - 0.3, "drop": None}
-    without = "Without a price: 15, as somebody is too slow, 0.90 m/s at most; drop, as somebody falls."
+    without = "Without a price: 15, as one person walks 0.90 m/s at most; drop, as somebody falls."
     assert comparison(1.1, 1.1, walked, prices) == f"Compared at 1.10 m/s walked. {without}"
     assert comparison(1.3, 1.2, walked, prices) == (
-        f"Compared at 1.20 m/s walked, as no foot reaches the asked 1.3 m/s. {without}"
+        f"Compared at 1.20 m/s walked, as on no foot all persons reach the asked 1.3 m/s. {without}"
     )
     assert comparison(1.1, 1.1, {"15": WALKED - 0.3, "drop": None}, [None, None]) == (
-        "No foot has a price: 15, as somebody is too slow, 0.90 m/s at most; drop, as somebody falls."
+        "No foot has a price: 15, as one person walks 0.90 m/s at most; drop, as somebody falls."
     )
 
 
