@@ -348,7 +348,7 @@ def _visual3d() -> bytes:
 
 def _nexus() -> bytes:
     people = human_gait(1.2)
-    frames = np.arange(1, 201)
+    frames = np.arange(1, 401)
     columns = {"Frame": frames, "Sub Frame": 0 * frames}
     for letter, offset in (("L", 0.2), ("R", 0.7)):
         for name, joint in {"hip": "Hip", "knee": "Knee", "ankle": "Ankle"}.items():

@@ -46,8 +46,8 @@ to 0.036 and 0.004 to 0.009 at 0.85 to 1.96 m/s."""
 USUAL_DELAY = -0.02
 """Time from toe-off by motion to toe-off by force [s]; chosen: some -0.005 in people's curves, and in walks here on
 sound, weak, passive and rigid feet -0.024 to -0.047, the mean of both legs."""
-UNLOADED = 0.05
-"""Moment of an ankle at toe-off over its peak in the stride [-]; chosen: so found, toe-offs of walks here are 6 ms off
+UNLOADED = 0.06
+"""Moment of an ankle at toe-off over its peak in the stride [-]; chosen: so found, toe-offs of walks here are 10 ms off
 those by force at most, by motion 15 to 67."""
 CUTOFF = 6.0
 """Low-pass frequency of angles for events and rates [Hz]: usual for walking (Winter 2009, ch. 3)."""
