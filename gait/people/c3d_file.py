@@ -23,9 +23,10 @@ from .motion_files import FILE_SIDES, Series, Trial, not_empty
 
 PLATE_LOAD = 20.0
 """Force above which a foot stands on a force plate [N]; chosen, as usual in gait laboratories."""
-_PLUG_IN_GAIT = {"hip": "HipAngles", "knee": "KneeAngles", "ankle": "AnkleAngles", "toe": "HXFFA"} | {
+PLUG_IN_GAIT = {"hip": "HipAngles", "knee": "KneeAngles", "ankle": "AnkleAngles", "toe": "HXFFA"} | {
     f"{joint}_moment": f"{joint.capitalize()}Moment" for joint in ("hip", "knee", "ankle")
 }
+"""Curve -> the name of its output in Plug-in Gait and the Oxford Foot Model, without the side's letter."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -97,7 +98,7 @@ def trial_of_recording(recording: LaboratoryRecording) -> Trial:
     legs: dict[str, Series] = {side: {} for side in FILE_SIDES}
     for side, curves in legs.items():
         letter = side[0].upper()  # L or R
-        for curve, label in _PLUG_IN_GAIT.items():
+        for curve, label in PLUG_IN_GAIT.items():
             if letter + label in points:
                 x = points[letter + label][0]
                 is_moment = curve.endswith("_moment")

@@ -5,7 +5,7 @@ devices only force plates are read: those with a force and a centre of pressure.
 """
 
 import csv
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,7 +16,7 @@ from springfoot.arrays import NDArray
 from springfoot.errors import SpringfootError
 from springfoot.files.text_table import Table, make_table, text_lines
 
-from .c3d_file import LaboratoryRecording, contacts_of_events
+from .c3d_file import PLUG_IN_GAIT, LaboratoryRecording, contacts_of_events
 from .gait_events import Contacts
 
 EVENTS_SECTION, DEVICES_SECTION = "Events", "Devices"
@@ -24,6 +24,19 @@ POINTS = ("Model Outputs", "Trajectories")
 """Sections of points, three components each."""
 SECTIONS = (EVENTS_SECTION, DEVICES_SECTION, *POINTS, "Joints", "Segments")
 """Names with which a section begins; the last two are not read."""
+HEADS = 4
+"""Lines of a section above its samples: rate, names, components and units."""
+UNITS_OF_ANGLES = {"": 1.0, "deg": 1.0, "rad": 180 / np.pi}
+"""Unit -> factor to degrees."""
+UNITS_OF_FORCES = {"": 1.0, "n": 1.0, "kn": 1e3}
+"""Unit -> factor to N."""
+UNITS_OF_LENGTHS = {"": 1.0, "mm": 1.0, "cm": 10.0, "m": 1e3}
+"""Unit -> factor to mm."""
+UNITS_OF_MOMENTS = {"": 1.0, "nmm/kg": 1.0, "nm/kg": 1e3}
+"""Unit -> factor to N mm/kg."""
+UNITS_OF = {label: UNITS_OF_MOMENTS if label.endswith("Moment") else UNITS_OF_ANGLES for label in PLUG_IN_GAIT.values()}
+UNITS_OF |= {"PelvisAngles": UNITS_OF_ANGLES, "HEE": UNITS_OF_LENGTHS, "TOE": UNITS_OF_LENGTHS}
+"""Output or marker, without the side's letter, that is read -> its units."""
 
 CsvLine = tuple[int, list[str]]
 """Number of a line, and its cells."""
@@ -32,37 +45,40 @@ CsvLine = tuple[int, list[str]]
 def is_nexus(path: Path) -> bool:
     """Tell whether a CSV file begins with the name of a section."""
     first = next((line for line in text_lines(path) if line.strip()), "")
-    return _name(first.split(",")) is not None
+    return _name(next(csv.reader([first]), [])) is not None
 
 
 def read_nexus(path: Path) -> LaboratoryRecording:
     """Return a walk that Nexus exported; raise `SpringfootError` for a file of another form, by line and column."""
-    sections = dict(_sections(path))
-    of_points = [_section(path.name, sections[name]) for name in POINTS if name in sections]
+    sections: dict[str, list[CsvLine]] = {}
+    for name, rows in _sections(path):
+        if name in sections:
+            raise SpringfootError(f"{path.name} has two sections {name}: export one trial")
+        sections[name] = rows
+    of_points = [_section(path.name, sections[name]) for name in POINTS if len(sections.get(name, [])) > HEADS]
     if not of_points:
-        raise SpringfootError(f"{path.name} has no section {' or '.join(POINTS)}: export the outputs of the model")
+        raise SpringfootError(f"{path.name} has no rows of {' or '.join(POINTS)}: export the outputs of the model")
+    rate = of_points[0].rate
     frames = [_frames(section.table) for section in of_points]
-    first = min(numbers[0] for numbers in frames)
-    count = max(numbers[-1] for numbers in frames) - first + 1
+    first = int(min(numbers[0] for numbers in frames))
+    count = int(max(numbers[-1] for numbers in frames)) - first + 1
+    if count > sum(map(len, frames)) or any(section.rate != rate for section in of_points):
+        raise SpringfootError(f"{path.name}: the frames of {' and '.join(POINTS)} must be of one trial")
     points: dict[str, NDArray] = {}
-    in_nm = False
     for section, numbers in zip(of_points, frames, strict=True):
-        for column, unit in section.units.items():
+        for column in section.units:
             name, _, component = column.rpartition(" ")
-            if component in ("X", "Y", "Z"):
-                point = points.setdefault(name, np.full((3, count), np.nan))
-                point["XYZ".index(component), numbers - first] = section.table.numbers(column, gaps=True)
-                in_nm |= name.endswith("Moment") and unit.startswith("nm/")
+            if component in ("X", "Y", "Z") and name[1:] in UNITS_OF:
+                values = section.in_units(column, UNITS_OF[name[1:]])
+                points.setdefault(name, np.full((3, count), np.nan))["XYZ".index(component), numbers - first] = values
+    has_plates = len(sections.get(DEVICES_SECTION, [])) > HEADS
     return LaboratoryRecording(
         name=path.name,
-        rate=of_points[0].rate,
+        rate=rate,
         first_frame=first,
         points=points,
-        moments_in_nm=in_nm,
-        events=_events(path.name, sections[EVENTS_SECTION]) if EVENTS_SECTION in sections else {},
-        plates=_plates(_section(path.name, sections[DEVICES_SECTION]), first, count)
-        if DEVICES_SECTION in sections
-        else (),
+        events=_events(path.name, sections.get(EVENTS_SECTION, [])),
+        plates=_plates(_section(path.name, sections[DEVICES_SECTION]), first, count, rate) if has_plates else (),
     )
 
 
@@ -100,23 +116,33 @@ class _Section(NamedTuple):
     units: dict[str, str]
     """Column -> its unit in lower case without blanks and dots, such as nmm/kg."""
 
+    def in_units(self, column: str, factors: Mapping[str, float]) -> NDArray:
+        """Return a column in the unit whose factor is 1, NaN where a cell is empty.
+
+        Raises `SpringfootError` for a unit without a factor.
+        """
+        unit = self.units[column]
+        if unit not in factors:
+            known = ", ".join(filter(None, factors))
+            raise SpringfootError(f"{self.table.name}, column {column}: unit must be one of {known}, got {unit}")
+        return factors[unit] * self.table.numbers(column, gaps=True)
+
 
 def _section(file: str, rows: list[CsvLine]) -> _Section:
     """Return a section of numbers from its lines; raise `SpringfootError` for lines of another form."""
-    if len(rows) < 5:
-        raise SpringfootError(f"{file} is cut short: a section needs rate, names, components, units and rows")
-    (rate_line, rate), (_, names), (line, components), (_, units), *samples = rows
+    (rate_line, rate), (_, names), (line, components), *samples = rows
     if [cell.strip() for cell in components[:2]] != ["Frame", "Sub Frame"]:
         raise SpringfootError(f"{file}, line {line}: must begin with Frame,Sub Frame")
+    units = [] if samples[0][1][0].strip() else samples.pop(0)[1]  # an empty line of units is left out before
     columns = ["Frame", "Sub Frame"]
     unit_of = {}
     name = ""
     # SUBJECT:NAME stands over its first component, nothing over the others.
     for head, component, unit in zip_longest(names[2:], components[2:], units[2:], fillvalue=""):
         name = head.rpartition(":")[2].strip() or name
-        if component.strip():
-            columns.append(f"{name} {component.strip()}")
-            unit_of[columns[-1]] = unit.lower().replace(" ", "").replace(".", "")
+        # A column without a component is kept, so that the others stay in their places.
+        columns.append(f"{name} {component.strip() or f'column {len(columns) + 1}'}".strip())
+        unit_of[columns[-1]] = unit.lower().translate(str.maketrans("", "", " .·*"))
     width = len(columns)
     padded = [(number, [*cells, *[""] * width][:width]) for number, cells in samples]
     header = Table(name=file, columns=["rate"], rows=[(rate_line, rate[:1])])
@@ -134,32 +160,45 @@ def _frames(table: Table) -> NDArray:
     return numbers.astype(int)
 
 
-def _plates(devices: _Section, first: int, count: int) -> list[dict[str, Any]]:
-    """Return the force plates among the devices, as ezc3d gives them, of `count` frames from `first` on."""
-    frames = devices.table.numbers("Frame")
-    kept = (frames >= first) & (frames < first + count)
+def _plates(devices: _Section, first: int, count: int, rate: float) -> list[dict[str, Any]]:
+    """Return the force plates among the devices, as ezc3d gives them, of `count` frames from `first` on.
+
+    Samples are averaged around each frame, of which there are `rate` a second; a frame without any has no force.
+    """
+    samples_a_frame = devices.rate / rate
+    position = devices.table.numbers("Frame") + devices.table.numbers("Sub Frame") / samples_a_frame
+    frame = np.floor(position + 0.5).astype(int) - first
+    kept = (frame >= 0) & (frame < count)
+    numbers = np.bincount(frame[kept], minlength=count)
+
+    def averaged(names: Sequence[str], factors: Mapping[str, float]) -> NDArray:
+        values = [np.nan_to_num(devices.in_units(name, factors))[kept] for name in names]
+        sums = np.array([np.bincount(frame[kept], column, minlength=count) for column in values])
+        return sums / np.maximum(numbers, 1)
+
     plates = []
     for column in devices.units:
         device, is_force, _ = column.partition(" - Force Fx")
-        columns = {
-            "force": [f"{device} - Force F{axis}" for axis in "xyz"],
-            "center_of_pressure": [f"{device} - CoP C{axis}" for axis in "xyz"],
-        }
-        if is_force and all(name in devices.units for names in columns.values() for name in names):
-            plate = {
-                key: np.stack([devices.table.numbers(name, gaps=True)[kept] for name in names])
-                for key, names in columns.items()
-            }
-            plates.append(plate | {"unit_force": "kN" if devices.units[column] == "kn" else "N"})
+        forces, centres = [f"{device} - Force F{axis}" for axis in "xyz"], [f"{device} - CoP C{axis}" for axis in "xyz"]
+        if is_force and all(name in devices.units for name in (*forces, *centres)):
+            plates.append(
+                {
+                    "force": averaged(forces, UNITS_OF_FORCES),
+                    "center_of_pressure": averaged(centres, UNITS_OF_LENGTHS),
+                    "unit_force": "N",
+                }
+            )
     return plates
 
 
 def _events(file: str, rows: list[CsvLine]) -> dict[str, Contacts]:
-    """Return side -> events of a section with the columns Context, Name and Time (s)."""
+    """Return side -> events of a section with the columns Context, Name and Time (s); none without rows."""
+    if len(rows) < 3:  # rate and heads
+        return {}
     table = make_table(file, rows[1:])
     text = {}
     for column in ("Context", "Name", "Time (s)"):
         if column not in table.columns:
-            raise SpringfootError(f"{file}, line {rows[1][0] if rows[1:] else 1}: no column {column} in the events")
+            raise SpringfootError(f"{file}, line {rows[1][0]}: no column {column} in the events")
         text[column] = [cells[table.columns.index(column)] for _, cells in table.rows]
     return contacts_of_events(text["Context"], text["Name"], table.numbers("Time (s)"))

@@ -185,9 +185,7 @@ def verdict(price: str, prices: Mapping[str, NDArray]) -> str:
     if dearer.pop(first, None):
         sentence += f": {difference(prices[least], prices[first]).text} against {first}"
     uncertain = [
-        f"{name}, {change.to_digits(1)}"  # tenths tell on which side of `GAP` an end lies
-        for name, change in changes.items()
-        if not (change.alike or change.told_apart)
+        f"{name}, {change.to_digits(1)}" for name, change in changes.items() if not (change.alike or change.told_apart)
     ]
     doubts = f" Uncertain against {least}: {'; '.join(uncertain)}." if uncertain else ""
     return f"{sentence}.{_against(least, dearer)}{doubts}"

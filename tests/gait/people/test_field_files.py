@@ -318,12 +318,48 @@ def test_plates_of_nexus_weigh_the_body_and_its_events_mark_the_strides_without_
         ("\n7,0,", "\n9,0,", "column Frame: 8 must be greater than 9 in the row before"),
         (",Context,", ",Side,", "no column Context in the events"),
         ("LKneeAngles", "LHipAngles", "column LHipAngles X stands twice"),
+        ("\nTrajectories\n100", "\nTrajectories\n200", "must be of one trial"),
+        ("\nTrajectories\n", "\nModel Outputs\n", "has two sections Model Outputs"),
     ],
 )
 def test_a_damaged_export_of_nexus_is_refused_by_line(old, new, words, tmp_path):
     path = nexus(tmp_path, plates=False)[0]
     path.write_text(path.read_text().replace(old, new))
     with pytest.raises(SpringfootError, match=words):
+        read_person([path])
+
+
+@pytest.mark.parametrize("lost", [(0, 1), (1000, 0)], ids=["the last sample", "the first second"])
+def test_forces_of_nexus_keep_their_time_where_samples_are_missing(lost, tmp_path):
+    whole = read_person(nexus(tmp_path)).legs["left"]
+    path = nexus(tmp_path)[0]
+    lines = path.read_text().splitlines()
+    begin = lines.index("Devices") + 5
+    end = lines.index("", begin)
+    path.write_text("\n".join([*lines[:begin], *lines[begin + lost[0] : end - lost[1]], *lines[end:]]) + "\n")
+    cut = read_person([path], trust_units=True).legs["left"]
+    shared = [np.abs(whole.times[:, 0] - strike).min() for strike in cut.times[1:-1, 0]]
+    assert len(shared) and max(shared) < 1e-3
+
+
+def test_units_of_nexus_are_those_that_it_names(tmp_path):
+    path = nexus(tmp_path)[0]
+    whole = read_person([path]).legs["left"]
+    lines = path.read_text().splitlines()
+    begin = lines.index("Devices") + 4
+    end = lines.index("", begin)
+    assert lines[begin] == ",,N,N,N,mm,mm,mm,N,N,N,mm,mm,mm"
+    rows = [line.split(",") for line in lines[begin + 1 : end]]
+    units = lines[begin].split(",")
+    metres = [
+        [f"{float(cell) / 1000:.8g}" if unit == "mm" else cell for unit, cell in zip(units, row, strict=True)]
+        for row in rows
+    ]
+    text = [*lines[:begin], lines[begin].replace("mm", "m"), *map(",".join, metres), *lines[end:]]
+    path.write_text("\n".join(text) + "\n")
+    np.testing.assert_allclose(read_person([path]).legs["left"].times, whole.times, atol=1e-6)
+    path.write_text("\n".join([*lines[:begin], lines[begin].replace("N", "lbf"), *lines[begin + 1 :]]) + "\n")
+    with pytest.raises(SpringfootError, match=r"Fx: unit must be one of n, kn, got lbf"):
         read_person([path])
 
 
