@@ -229,11 +229,13 @@ def toe_off_of(table: Table, side: str, curves: Series) -> float | None:
     """Return the phase of toe-off, 0..1, of a leg with mean `curves` (101,); None if the table does not tell it.
 
     `side` is left, right or "". The column of that leg goes before the leg's vertical force, and that before the column
-    of both legs.
+    of both legs. Raises `SpringfootError` for a phase outside `ACCEPTED`.
     """
     own = f"{TOE_OFF_COLUMN}_{side}" if side else TOE_OFF_COLUMN
     if table.has(own):
-        return float(table.numbers(own)[0]) / 100
+        phase = float(table.numbers(own)[0]) / 100
+        _require_accepted(f"{table.name}: {own}", "toe_off", phase)
+        return phase
     if "grf_vertical" in curves and (loaded := np.flatnonzero(curves["grf_vertical"] > CONTACT_THRESHOLD_BW)).size:
         last = min(int(loaded[-1]), len(PERCENT) - 2)
         before, after = curves["grf_vertical"][last : last + 2]

@@ -534,6 +534,9 @@ def test_each_leg_has_its_own_toe_off_in_mean_curves(tmp_path):
     columns |= {"toe_off_percent_left": np.full(101, 57.0)}
     measured = read_person([write(tmp_path / "mean.csv", columns, separator=",")], trust_units=True)
     assert measured.toe_off("left") == 0.57
+    columns |= {"toe_off_percent_left": np.full(101, 0.3)}
+    with pytest.raises(SpringfootError, match=r"toe_off_percent_left must be in \[0.3, 0.9\] of the stride, got 0.003"):
+        read_person([write(tmp_path / "mean.csv", columns, separator=",")])
 
 
 def test_strides_off_the_force_plate_count_for_angles_alone(tmp_path):
