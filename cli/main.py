@@ -84,6 +84,10 @@ STUDIES = {
         "feet.foot_map.FootMap",
         "Which feet does a learned person walk on, and what is it worth to know them?",
     ),
+    "specialists": (
+        "feet.specialists.Specialists",
+        "How much less does a walk cost if the person learns one foot alone? (trains)",
+    ),
     "landscape": (
         "springs.landscape.Landscape",
         "With which stiffness of ankles and toes does a person walk, fall, and take least?",

@@ -32,9 +32,9 @@ from springfoot.evaluation.report import STYLE
 from springfoot.files.markdown import MISSING, table, text_of
 from springfoot.gait.plan import PLAN_SPEED_RANGE
 
+from ..base.adapting_persons import person_and_settings
 from ..base.flags import read_foot_flag
 from ..base.study import QUICK_NOTE, Answer, OnProgress, WalkingStudy
-from .adapting_persons import person_and_settings
 from .foot_numbers import numbers_of_feet
 from .orthosis import braced_calf
 from .told_apart import GAP, common_speed, comparison, difference, price_at, verdict

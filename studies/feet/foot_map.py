@@ -26,8 +26,8 @@ from springfoot.evaluation.numbers import measure
 from springfoot.evaluation.recording import policy_and_settings, record, record_feet
 from springfoot.files.markdown import MISSING, table, text_of
 
+from ..base.adapting_persons import person_and_settings
 from ..base.study import Answer, OnProgress, WalkingStudy
-from .adapting_persons import person_and_settings
 from .foot_numbers import numbers_of_feet
 from .walked_speeds import Row, rows_csv
 

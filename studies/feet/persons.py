@@ -25,8 +25,8 @@ from springfoot.evaluation.recording import TICK, WARM_UP, Episodes, policy_and_
 from springfoot.files.markdown import MISSING, table, text_of
 from springfoot.files.writing import csv_text
 
+from ..base.adapting_persons import person_and_settings
 from ..base.study import Answer, OnProgress, WalkingStudy
-from .adapting_persons import person_and_settings
 
 WALKED = {"height_range": (1.5, 1.9), "mass_range": (50.0, 90.0), "speed_range": (0.8, 1.6)}
 """Heights [m], masses [kg] and commanded speeds [m/s] of the drawn episodes."""

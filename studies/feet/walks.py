@@ -19,8 +19,8 @@ from springfoot.evaluation.recording import BATCH, WARM_UP, policy_label, record
 from springfoot.files.markdown import table, text_of
 from springfoot.files.provenance import versions_and_commit
 
+from ..base.adapting_persons import person_and_settings
 from ..base.study import Answer, OnProgress, WalkingStudy, without_places
-from .adapting_persons import person_and_settings
 from .foot_choice import MOST_FEET, SIDES_OF, named_feet
 from .foot_numbers import FOOT_NUMBERS, numbers_of_feet
 from .orthosis import braced_calf

@@ -17,10 +17,10 @@ from springfoot.evaluation.recording import TICK, Recording
 from springfoot.gait import GRAVITY, PERCENT
 from springfoot.gait.people import on_percent
 
+from ..base.adapting_persons import person_and_settings
 from ..base.condition_walks import ConditionWalks
 from ..base.kept import Kept
 from ..base.study import OnProgress, PersonsStudy
-from ..feet.adapting_persons import person_and_settings
 from ..feet.walked_speeds import TWO_PRICES
 
 FIBRE, ALL_EFFORT = TWO_PRICES
