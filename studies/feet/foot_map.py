@@ -64,13 +64,13 @@ TOLD = ("the truth", SOUND_FOOT)
 def told_sound(act: PolicyFunction, settings: BipedSettings) -> PolicyFunction:
     """Return a policy that acts as `act` does if the observation's entries on the worn feet are those of sound feet."""
     names = [entry.name for entry in PERSON_OBSERVATION]
-    first = len(names) - WORN
+    first = names.index("muscles_ankle_left")
     sound = worn_entries(body_of(settings), SOUND)
 
     def acting(observation: NDArray) -> NDArray:
         """Return the actions of `act` for observations (..., entries) that say "both feet are sound"."""
         changed = observation.copy()
-        changed[..., first:] = sound
+        changed[..., first : first + WORN] = sound
         return act(changed)
 
     return acting

@@ -13,13 +13,15 @@ WORDS = {"acts": "both", "ankle_tendon": 400.0}
 def test_a_person_who_is_told_a_sound_foot_sees_what_it_sees_on_one():
     seen = []
     for foot in ("intact", "rigid"):
-        settings = settings_from(right_foot=foot, **WORDS)
+        settings = settings_from(left_foot=foot, right_foot=foot, **WORDS)
         biped = Biped(settings, 1)
         biped.reset(np.arange(1), [0])
         seen.append(told_sound(lambda observation: observation, settings)(biped.observe()))
     names = list(biped.observation_names)
     feet = slice(names.index("muscles_ankle_left"), names.index("leg_ratio"))
     assert (seen[0][:, feet] == seen[1][:, feet]).all()
+    others = np.r_[: feet.start, names.index("leg_ratio") : len(names)]
+    assert (seen[1][:, others] == biped.observe()[:, others]).all()
     assert (biped.observe()[:, feet] != seen[1][:, feet]).any()  # the environment's own stays
 
 
