@@ -14,9 +14,8 @@ from typing import Annotated, Any, ClassVar
 
 import tyro
 
-from springfoot.agents.policies import RUN
-from springfoot.agents.training import PRESETS, TrainingConfig, config_from_json, is_finished, read_record
-from springfoot.errors import SpringfootError, require_count
+from springfoot.agents.training import PRESETS, TrainingConfig, read_record
+from springfoot.errors import require_count
 from springfoot.evaluation.numbers import measure
 from springfoot.evaluation.recording import record
 from springfoot.files.markdown import MISSING, table, text_of
@@ -24,6 +23,7 @@ from springfoot.files.writing import make_folder
 
 from ..base.adapting_persons import person_and_settings
 from ..base.study import Answer, OnProgress, WalkingStudy
+from ..base.trained import finish_training
 from .both_feet import both, braced
 from .walked_speeds import TWO_PRICES, Row, price_numbers, rows_csv
 
@@ -81,7 +81,8 @@ class Specialists(WalkingStudy):
         for number, person in enumerate(self.persons):
             for place, (cell, feet) in enumerate(self._cells.items()):
                 folder = self._folder / f"person-{number + 1}-cell-{place + 1}"
-                self._train(person, feet, folder)
+                make_folder(folder.parent)
+                finish_training(self._config(person, feet), folder, begin_from=person)
                 before = self._numbers(person, feet)
                 after = self._numbers(str(folder), feet)
                 rows.append({"person": person, "cell": cell, **_columns(before, after), "gained": late_gain(folder)})
@@ -102,24 +103,6 @@ class Specialists(WalkingStudy):
     def _folder(self) -> Path:
         """Return the folder of the trainings: `runs`, with --quick `RUNS-quick` beside it."""
         return self.runs.with_name(f"{self.runs.name}-quick") if self.quick else self.runs
-
-    def _train(self, person: str, feet: Mapping[str, Any], folder: Path) -> None:
-        """Train a person on with `feet` alone in the folder, or go on there; do nothing if that is finished.
-
-        Raises `SpringfootError` if the folder holds another training, and `KeyboardInterrupt` if the user stops it.
-        """
-        from springfoot.agents import resume, train  # torch takes seconds, which --help need not wait for
-
-        config = self._config(person, feet)
-        begun = (folder / RUN).is_file()
-        if begun and replace(config_from_json(read_record(folder)["config"]), threads=self.threads) != config:
-            raise SpringfootError(f"{folder} was trained with other settings; choose another folder")
-        if begun and is_finished(folder):
-            return
-        make_folder(folder.parent)
-        result = resume(folder, threads=self.threads) if begun else train(config, folder, begin_from=person)
-        if result["status"] == "interrupted":
-            raise KeyboardInterrupt
 
     def _config(self, person: str, feet: Mapping[str, Any]) -> TrainingConfig:
         """Return the training of a person's specialist: the preset's, but with the person's prices, under the

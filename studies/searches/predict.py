@@ -18,17 +18,17 @@ from typing import Annotated, Any, ClassVar
 
 import tyro
 
-from springfoot.agents.policies import RUN
-from springfoot.agents.training import PRESETS, config_from_json, is_finished, read_record
+from springfoot.agents.training import PRESETS
 from springfoot.envs.control import constants_name
 from springfoot.envs.settings import BipedSettings
-from springfoot.errors import SpringfootError, require_count
+from springfoot.errors import require_count
 from springfoot.files.locks import owned
 from springfoot.files.markdown import table
 from springfoot.files.writing import make_folder, write_atomically
 
 from ..base.pushed_walks import PushedWalks, kept_metrics
 from ..base.study import Answer, OnProgress, WalkingStudy, without_places
+from ..base.trained import finish_training
 from .constants_file import read_constants, write_constants
 from .generic_constants import GENERIC
 from .leg_tuning import LegTuning
@@ -186,22 +186,11 @@ class Predict(WalkingStudy):
 
         Raises `SpringfootError` if other settings were trained there, and `KeyboardInterrupt` if the user stops it.
         """
-        from springfoot.agents import resume, train  # torch takes seconds, which --help need not wait for
-
         preset = PRESETS["predict"]
         config = replace(
             preset, timesteps=self.timesteps, seed=self.search_seed, environment=settings, threads=self.threads
         )
-        if (out / RUN).is_file():
-            before = config_from_json(read_record(out)["config"])
-            if replace(before, threads=config.threads) != config:
-                raise SpringfootError(f"{out} was trained with other settings; choose another folder")
-        if is_finished(out):
-            return
-        begun = (out / RUN).is_file()
-        record = resume(out, threads=self.threads) if begun else train(config, out)
-        if record["status"] == "interrupted":
-            raise KeyboardInterrupt
+        finish_training(config, out)
 
     def _evaluate(self, found: Path, digest: str, policy: Path, settings: BipedSettings) -> str:
         """Walk with schedule and policy, undisturbed and pushed, and return the report's text.
