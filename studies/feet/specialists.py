@@ -88,9 +88,9 @@ class Specialists(WalkingStudy):
                 rows.append({"person": person, "cell": cell, **_columns(before, after), "gained": late_gain(folder)})
                 progress(1)
         text = (
-            f"{gap_table(rows)}\n\n{self.what_ran} of each, commanded 1.2 m/s on level ground; trained on for "
-            f"{self.timesteps:,} steps. Gaps: specialist less generalist. Still gained: best return of the last "
-            "quarter of the periodic evaluations over the best before. Ranges are over persons."
+            f"{gap_table(rows)}\n\n{self.what_ran} of each, commanded 1.2 m/s on level ground; trained there for "
+            f"{self.timesteps:,} steps, without pushes. Gaps: specialist less generalist. Still gained: best return of "
+            "the last quarter of the periodic evaluations over the best before. Ranges are over persons."
         )
         return Answer(text=text, files={"specialists.csv": rows_csv(rows)})
 
@@ -142,7 +142,10 @@ def late_gain(folder: Path) -> float | None:
     None with fewer than four evaluations."""
     returns = [entry["return_mean"] for entry in read_record(folder)["evaluations"]]
     late = len(returns) // 4
-    return max(returns[-late:]) / max(returns[:-late]) - 1.0 if late else None
+    if not late:
+        return None
+    before = max(returns[:-late])
+    return (max(returns[-late:]) - before) / abs(before)  # a return may be negative
 
 
 def gap_table(rows: Sequence[Row]) -> str:
