@@ -3,20 +3,13 @@
 from hashlib import sha256
 from typing import Any
 
+from springfoot.envs.batch.learned_person import LEARNED
 from springfoot.envs.settings.settings import BipedSettings, settings_to_json
 from springfoot.errors import SpringfootError, perhaps
 from springfoot.files.text_table import read_bytes
 
 from .policy import PRETRAINED_BY, SHIPPED, find_policy, read_policy
 
-LEARNED_3_BY = (
-    "`springfoot train --preset person --seed 1 --out runs/first`, then `springfoot train --preset person --seed 11 "
-    "--begin-from runs/first --timesteps 6000000 --learning-rate 1.2e-4 --learning-rate-end 0.05 "
-    "--forward-force-weight 2.5 "
-    """--reward-weights '{"pose": 15, "grf": 26, "fibre_work": -38, "impact": -4}'`, its last policy, """
-    "both when the preset had the prices of `learned-2`"
-)
-"""Commands that made `learned-3` from nothing."""
 MADE = {
     "pretrained": ("Walks on level ground at 1.2 m/s, and goes on when it is pushed.", f"`{PRETRAINED_BY}`", "walk"),
     "medium": (
@@ -25,22 +18,15 @@ MADE = {
         "walk",
     ),
     "predicted": ("Walks by a plan that knows no person's curves.", "`springfoot study predict`", "prediction"),
-    "learned": (
-        "Moves hips, knees and ankles too, on any foot, body, speed and slope that it drew; the preset draws more now.",
-        "`springfoot train --preset person`, when the preset had the settings below",
-        "feet",
-    ),
-    "learned-2": (
-        "Trained from nothing by one command; walks at other step times, too.",
-        "`springfoot train --preset person --seed 2`, when the preset had the settings below; its last policy",
-        "feet",
-    ),
-    "learned-3": (
-        "Trained from nothing, then on at a higher price of muscles and forces and a lower one of angles: fell least "
-        "of the three in 500 drawn walks, and walks at other step times, too. It lands harder than `learned`.",
-        LEARNED_3_BY,
-        "feet",
-    ),
+    **{
+        name: (
+            "Moves hips, knees and ankles too, on any foot, body, speed, step time and slope that it drew.",
+            f"`springfoot train --preset person --seed {LEARNED[name].rpartition('-')[2]}`, its last policy",
+            "feet",
+        )
+        for name in SHIPPED
+        if name in LEARNED
+    },
 }
 """Policy -> purpose, the command that made it, and the page of its results."""
 SHARED_LIMITS = "One planar body in simulation; a stiffness that walks here is none for a patient's foot."

@@ -15,7 +15,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from springfoot.envs.batch.biped_batch import Biped
-from springfoot.envs.batch.learned_person import POLICY_ENTRIES, person_file
+from springfoot.envs.batch.learned_person import LEARNED, POLICY_ENTRIES, person_file
 from springfoot.envs.settings.settings import BipedSettings, settings_from, settings_to_json, with_bodies_of_model
 from springfoot.envs.task.mirror import Mirror, mirror_of
 from springfoot.errors import SpringfootError, perhaps, quoted
@@ -53,9 +53,7 @@ SHIPPED = {
     "pretrained": _PRETRAINED / "walk.safetensors",
     "medium": _PRETRAINED / "medium.safetensors",
     "predicted": _PRETRAINED / "predicted.safetensors",
-    "learned": person_file("learned"),
-    "learned-2": person_file("learned-2"),
-    "learned-3": person_file("learned-3"),
+    **{name: person_file(name) for name in LEARNED if name != "learned-1"},  # that one is `learned`
 }
 """Name of a policy of this package -> its file; `policy_card` describes each."""
 PRETRAINED_BY = "springfoot train --push-newton 250 --timesteps 14000000 --out runs/pretrained"

@@ -24,10 +24,10 @@ from ..task.observation_entries import PERSON_OBSERVATION
 
 PERSONS_FOLDER = Path(__file__).parent / "persons"
 """Folder of the persons that come with the package."""
-LEARNED = {"learned": "learned-1", "learned-1": "learned-1", "learned-2": "learned-2", "learned-3": "learned-3"}
-"""Name of a person of this package -> its file in `PERSONS_FOLDER`, without suffix. The first is `last.safetensors` of
-`springfoot train --preset person`, when it drew fewer pairs of feet; the cards of the others tell their trainings
-(`springfoot.agents.policies.cards`)."""
+PERSON_SEEDS = (1, 2)
+"""Seeds of the trainings of the persons that come with the package, `springfoot train --preset person --seed SEED`."""
+LEARNED = {"learned": "learned-1"} | {name: name for name in (f"learned-{seed}" for seed in PERSON_SEEDS)}
+"""Name of a person of this package -> its file in `PERSONS_FOLDER`, without suffix: the training's last policy."""
 POLICY_ENTRIES = frozenset({"format_version", "network", "settings", "fingerprint"})
 """Entries of a policy's header."""
 PERSON_NAMES = tuple(entry.name for entry in PERSON_OBSERVATION)

@@ -2,7 +2,7 @@
 
 The offsets are added to the rest angles that the leg constants give, every 20 ms. They are 0 while the body stands, and
 do nothing at an ankle with a rest angle or a device of its own. A person that walks more slowly than commanded aims at
-ever more speed, and one that walks faster at less: the commanded speed that it observes is the one that it aims at.
+ever more speed, and one that walks faster at less: it observes by how much.
 """
 
 from math import radians

@@ -255,11 +255,11 @@ class Simulation:
         forget(self.arrays.bodies["muscles"], ids, self.now.angle, self.now.velocity)
         return self.now
 
-    def contact_height(self, ids: NDArray | slice) -> NDArray:
-        """Return the height (K, side, contact) of the contacts of simulations `ids` (K,) above the ground [m], in the
-        present posture."""
+    def contact_points(self, ids: NDArray | slice) -> NDArray:
+        """Return the lowest points (K, side, contact, 2) of the contacts of simulations `ids` (K,) in the present
+        posture: x and the height above the ground [m]."""
         self._measure_without_forces(ids)
-        return self.now.contact[ids, ..., 1]
+        return self.now.contact[ids]
 
     def _measure_without_forces(self, ids: NDArray | slice) -> None:
         """Measure all simulations, those of `ids` (K,) without contact forces."""

@@ -206,13 +206,13 @@ class BipedSettings:
     knees and ankles, every 20 ms; or both (`springfoot.envs.control.person_actions`)."""
     person: str = field(default="tuned", metadata=_PERSON)
     """Who walks where the action sets stiffness alone: the tuned rest angles (tuned); a person of the package, who
-    has learned other feet, bodies and slopes (learned, learned-2, learned-3); or another one, a policy file of
+    has learned other feet, bodies and slopes (learned, learned-2 to learned-4); or another one, a policy file of
     `springfoot train --preset person`."""
     person_range_deg: float = field(default=14.0, metadata=_PERSON)
     """Largest offset of a rest angle, that of an action of 1 [0..30 deg]."""
     aim_rate: float = field(default=0.0, metadata=_PERSON)
     """Rate at which a person that walks too slowly aims at more than the commanded speed, one too fast at less [0..5
-    1/s]; the person observes the speed that it aims at, at most 0.2 m/s from the commanded one."""
+    1/s]; the person observes by how much, at most 0.2 m/s."""
     stiffness_by: StiffnessBy = field(default="action", metadata=_PERSON | _REPLACED)
     """Who sets the stiffness where the action moves the person: the action, with `acts` `person` the fixed schedule;
     that schedule always (schedule); the schedule times a

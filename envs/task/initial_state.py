@@ -11,11 +11,14 @@ from ..control.constants import LegConstants
 from ..control.phase_table import GRID, PhaseTable, leg_phases
 from ..control.reference_walk import ReferenceWalk
 from ..control.subjects import Subjects
-from ..physics.model import ANKLE, HIP, JOINTS
+from ..physics.contact import CONTACTS
+from ..physics.model import ANKLE, HIP, JOINTS, LEFT, RIGHT
 from ..physics.simulation import Simulation
 
 START_PHASES = (0.08, 0.38)
 """Range of stride phases of both legs at a random start; chosen: near double support bodies fall."""
+_MOMENT = 1e-5
+"""Time over which the motion of the stance foot at a start is measured [s]; chosen, its square is lost in rounding."""
 _SWINGS_FROM = 0.6
 """Stride phase from which a leg swings, about that of toe-off."""
 START_DEPTH = 0.001
@@ -59,10 +62,12 @@ def place(
     ids: NDArray,
     posture: tuple[NDArray, NDArray, NDArray, NDArray],
     noise: NDArray,
+    left_phase: NDArray | None = None,
 ) -> None:
     """Put simulations into a posture, with the lowest contact point of each `START_DEPTH` in the floor.
 
-    Locked joints start at their rest angle.
+    Locked joints start at their rest angle. The hips move forward at the speed of the posture, or so that the foot in
+    stance rests.
 
     Args:
         simulation: the N simulations.
@@ -71,6 +76,7 @@ def place(
         posture: angles (K, side, joint) [rad] and their rates [rad/s], pitch of the trunk (K,) [rad] and forward speed
             (K,) [m/s], of `walking_posture` or `Standing.reset`.
         noise: (K, 2, side, joint) relative error of angles ([:, 0]) and rates ([:, 1]) [-].
+        left_phase: (K,) stride phase of the left leg, to let the foot in stance rest; None for the posture's speed.
     """
     angle, velocity, pitch, speed = posture
     angle = angle * (1.0 + noise[:, 0])
@@ -83,10 +89,25 @@ def place(
     base, rate = np.zeros((2, len(ids), 3))  # of the hips: x [m], z [m], pitch [rad], and their rates
     base[:, 2] = pitch
     rate[:, 0] = speed
+    if left_phase is not None:
+        rate[:, :2] = -_foot_velocity(simulation, ids, base, angle, velocity, np.where(left_phase < 0.5, LEFT, RIGHT))
     simulation.reset(ids, base, rate, angle, velocity)
     # With the hips at height 0 the height of the lowest point says how far to lift the body.
-    lowest = simulation.contact_height(ids).min(axis=(1, 2))  # over sides and contacts
+    lowest = simulation.contact_points(ids)[..., 1].min(axis=(1, 2))  # over sides and contacts
     simulation.lift(ids, -lowest - START_DEPTH * simulation.body.length_scale * subjects.scale["length"][ids])
+
+
+def _foot_velocity(
+    simulation: Simulation, ids: NDArray, base: NDArray, angle: NDArray, velocity: NDArray, side: NDArray
+) -> NDArray:
+    """Return the velocity (K, 2) of the lowest contact of the foot on the given side (K,) while the hips rest: forward,
+    and up from the ground [m/s]; `base`, `angle` and `velocity` as for `Simulation.reset`, which is called."""
+    before, after = np.empty((2, len(ids), len(CONTACTS), 2))
+    for points, moment in ((before, -_MOMENT), (after, _MOMENT)):
+        simulation.reset(ids, base, np.zeros_like(base), angle + moment * velocity, velocity)
+        points[:] = simulation.contact_points(ids)[np.arange(len(ids)), side]
+    lowest = (before + after)[..., 1].argmin(axis=1)
+    return ((after - before) / (2.0 * _MOMENT))[np.arange(len(ids)), lowest]
 
 
 def _start_curves(walk: ReferenceWalk) -> NDArray:

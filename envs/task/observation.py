@@ -46,6 +46,7 @@ SEEN = np.dtype(
         ("stiffness", float, (len(SIDES), 2)),  # logarithm of K over its unit
         ("worn", float, WORN),
         ("planned_step", float),
+        ("held_speed", float, 2),  # mean speed minus the commanded one, speed aimed at beyond it
     ]
 )
 """The entries of `PERSON_OBSERVATION`, in order, before they are made dimensionless [SI]."""
@@ -119,12 +120,13 @@ def observe(rows, controls, bodies, table, observation) -> None:
             for contact in range(3):
                 seen.load[side, contact] = row.force[side, contact, 1]  # [1]: upward
         if count > _SHORT:
-            seen.command[0] += control.person.aim
             seen.own_stiffness = 1 - control.source.not_action
             seen.slope = control.subject.slope
             for k in range(len(seen.worn)):
                 seen.worn[k] = row.worn[k]
             seen.planned_step = 0.5 * control.subject.scale.length * targets[LEFT].stride_length
+            seen.held_speed[0] = row.mean_speed - control.subject.speed
+            seen.held_speed[1] = control.person.aim
             for side in range(2):
                 for joint in range(2):
                     seen.stiffness[side, joint] = _stiffness_entry(row, control, side, joint)

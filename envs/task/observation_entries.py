@@ -71,7 +71,8 @@ def _entries() -> tuple[Entry, ...]:
 
 
 def _person_entries() -> tuple[Entry, ...]:
-    """Return the entries that only a person observes, in order: last offsets, slope, stiffness, feet, body, step."""
+    """Return the entries that only a person observes, in order: last offsets, slope, stiffness, feet, body, step,
+    and the speed that it holds."""
     springs = [(side, joint) for side in SIDES for joint in ("ankle", "toe")]
     return (
         *(Entry(f"last_{name}", "rad", -1.0, 1.0, "offset of the step before", False) for name in PERSON_ACTIONS),
@@ -86,6 +87,8 @@ def _person_entries() -> tuple[Entry, ...]:
         Entry("foot_ratio", "1", 0.0, 2.0, "foot length over the average at that height", False),
         Entry("carried_ratio", "1", 0.0, 2.0, "load over body mass", False),
         Entry("planned_step", "leg length", 0.0, 2.0, "step length of the plan", False),
+        Entry("held_speed_error", "sqrt(g l)", -5.0, 5.0, "mean speed of 0.7 s minus the commanded one"),
+        Entry("aim", "sqrt(g l)", -1.0, 1.0, "speed that it aims at beyond the commanded one", False),
     )
 
 
@@ -113,5 +116,4 @@ OBSERVATION = _entries()
 body and load. No entry shows the mass of the body, as mechanics scale with it (`envs.physics.model`)."""
 PERSON_OBSERVATION = OBSERVATION + _person_entries()
 """Every entry of the observation where the action moves the person: `OBSERVATION`, and the entries of a person.
-The commanded speed is the one that the person aims at (setting `aim_rate`). Stiffness is over that unit at 1.70 m and
-63 kg, scaled with mass x height."""
+Stiffness is over that unit at 1.70 m and 63 kg, scaled with mass x height; `aim` follows the setting `aim_rate`."""

@@ -69,8 +69,8 @@ STATE_NAMES = {
 HEIGHT_AROUND, MASS_AROUND, SPEED_AROUND = 0.02, 2.0, 0.15
 """Ranges on either side of a person's height [m], mass [kg] and speed [of it] in which a learned person is taught;
 chosen: their own step at a far speed may be longer than their legs allow."""
-TAUGHT = "learned-2"
-"""Learned person that `--train` begins from; chosen: it was trained by one command."""
+TAUGHT = "learned"
+"""Learned person that `--train` begins from."""
 SPRING_EVENTS = {
     "ankle": ("heel strike", "foot flat", "maximum dorsiflexion of the ankle", "toe-off"),
     "toe": ("heel strike", "heel-off", "maximum dorsiflexion of the toe", "toe-off"),

@@ -134,7 +134,7 @@ def test_given_weights_leave_the_others_of_the_preset():
     preset = PRESETS["person"]
     weights = train_command.configured(preset, {}, {"reward_weights": {"pose": 1.0}}).environment.reward_weights
     assert weights == preset.environment.reward_weights | {"pose": 1.0}
-    assert weights["fibre_work"] == -38.0
+    assert weights["fibre_work"] == -45.0
 
 
 def test_human_names_a_file_one_of_its_conditions_or_several_files(tmp_path):

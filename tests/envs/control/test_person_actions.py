@@ -2,15 +2,18 @@
 
 from math import radians
 
+import mujoco
 import numpy as np
 import pytest
 
 from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.control.person_actions import FARTHEST_AIM
 from springfoot.envs.control.stiffness_source import DRAWN_SOURCES
-from springfoot.envs.physics.model import ACTIONS, ANKLE, HIP, KNEE, PERSON_ACTIONS
+from springfoot.envs.physics.contact import CONTACTS
+from springfoot.envs.physics.model import ACTIONS, ANKLE, HIP, KNEE, PERSON_ACTIONS, SIDES
 from springfoot.envs.settings.settings import BipedSettings
 from springfoot.envs.task.observation_entries import OBSERVATION, PERSON_OBSERVATION
+from springfoot.envs.task.reward import HELD_SECONDS
 from springfoot.errors import SpringfootError
 
 NAMES = [entry.name for entry in PERSON_OBSERVATION]
@@ -41,10 +44,10 @@ def test_offsets_move_the_rest_angles_of_hips_knees_and_ankles_by_their_range() 
 
 
 def test_no_offset_walks_as_without_a_person_to_the_bit() -> None:
-    alone = started(BipedSettings(action_mode="residual"), 3)
-    with_person = started(BipedSettings(action_mode="residual", acts="both"), 3)
+    alone = started(BipedSettings(action_mode="residual", start="standing"), 3)  # walking starts differ
+    with_person = started(BipedSettings(action_mode="residual", start="standing", acts="both"), 3)
     random = np.random.default_rng(0)
-    for _ in range(60):
+    for _ in range(250):
         action = random.uniform(-1, 1, (3, 4))
         expected = alone.step(action)
         result = with_person.step(np.concatenate([action, np.zeros((3, 6))], 1))
@@ -190,9 +193,20 @@ def test_a_person_aims_at_the_speed_that_it_lacks_within_bounds() -> None:
         expected = np.clip(expected + 2.0 * biped.dt * lacking, -FARTHEST_AIM, FARTHEST_AIM)
         aims.append(float(biped.subjects.rows["person"]["aim"][0]))
         assert aims[-1] == pytest.approx(expected, abs=1e-12)
-        seen = float(observation[0, NAMES.index("command_speed")]) * unit
-        assert seen == pytest.approx(biped.settings.speed + aims[-1], abs=1e-6)
+        assert float(observation[0, NAMES.index("aim")]) * unit == pytest.approx(aims[-1], abs=1e-6)
+        assert float(observation[0, NAMES.index("command_speed")]) * unit == pytest.approx(biped.settings.speed)
     assert np.ptp(aims) > 0.01
+
+
+def test_a_person_is_told_how_far_its_mean_speed_is_from_the_commanded_one() -> None:
+    biped = started(BipedSettings(acts="both"))
+    unit = np.sqrt(9.81 * biped.body.leg_length)
+    mean = biped.settings.speed
+    for _ in range(60):
+        seen = float(biped.step(np.zeros((1, 10))).observation[0, NAMES.index("held_speed_error")])
+        mean += biped.dt / HELD_SECONDS * (biped.measurement.com_velocity[0, 0] - mean)
+        assert seen * unit == pytest.approx(mean - biped.settings.speed, abs=1e-6)
+    assert abs(mean - biped.settings.speed) > 0.01
 
 
 def test_the_aim_rests_on_the_commanded_speed_while_a_body_stands_and_at_a_reset() -> None:
@@ -216,3 +230,35 @@ def test_the_aim_of_a_body_left_out_stays_and_that_of_the_other_moves() -> None:
     lacking = biped.settings.speed - biped.measurement.com_velocity[0, 0]
     assert after[0] == pytest.approx(before[0] + 2.0 * biped.dt * lacking, abs=1e-12)
     assert after[1] == before[1] != 0.0
+
+
+@pytest.mark.parametrize("slope_deg", [-5.0, 0.0, 5.0])
+def test_a_person_starts_on_a_foot_at_rest_and_tuned_legs_with_the_commanded_speed(slope_deg: float) -> None:
+    drawn = {"slope_deg": slope_deg, "speed_range": (0.8, 1.6), "height_range": (1.5, 1.9)}
+    biped = started(BipedSettings(acts="both", **drawn), 20)
+    stance = np.where(biped.leg_phase[:, 0] < 0.5, 0, 1)
+    before, after = (moved_contacts(biped, moment)[np.arange(20), stance] for moment in (-1e-6, 1e-6))
+    lowest = np.argmin(before[..., 1] - np.tan(np.radians(slope_deg)) * before[..., 0], axis=-1)
+    velocity = (after - before)[np.arange(20), lowest] / 2e-6
+    np.testing.assert_allclose(velocity, 0.0, atol=1e-4)
+    tuned = started(BipedSettings(**drawn), 20)
+    assert np.array_equal(tuned.measurement.base_velocity[:, 0], tuned.subjects.speed)
+    assert np.ptp(biped.measurement.base_velocity[:, 0] - biped.subjects.speed) > 0.05
+
+
+def moved_contacts(biped: Biped, moment: float) -> np.ndarray:
+    """Return the lowest points (N, side, contact, 2) of the contacts in the world after a time of steady motion."""
+    data = [biped.data(index) for index in range(biped.num_envs)]
+    points = []
+    for index, state in enumerate(data):
+        model = biped.model_of(index)
+        state.qpos[:] += moment * state.qvel
+        mujoco.mj_forward(model, state)
+        points.append([[lowest_point(model, state, f"{contact}_{side}") for contact in CONTACTS] for side in SIDES])
+    return np.array(points)
+
+
+def lowest_point(model, data, name: str) -> np.ndarray:
+    """Return the lowest point (x, z) of a contact sphere [m]."""
+    geom = model.geom(name).id
+    return data.geom_xpos[geom, [0, 2]] - [0.0, model.geom_size[geom, 0]]

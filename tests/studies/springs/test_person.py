@@ -164,7 +164,7 @@ def test_every_file_is_written_and_read_again(mine, tmp_path, capsys):
     assert {path.name for path in out.iterdir()} == {*FILES, *PICTURES}
     for words in (
         "springfoot train --human",
-        f"springfoot train --preset person --begin-from learned-2 --human {out / 'curves.csv'} --height-range 1.68 "
+        f"springfoot train --preset person --begin-from learned --human {out / 'curves.csv'} --height-range 1.68 "
         "1.72 --mass-range 69 73 --speed-range ",
         " --drawn-bodies None --out runs/me-person",
         "no property of a spring",
