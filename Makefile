@@ -202,7 +202,7 @@ predict: install
 # `make -j2 answers`, with the same bits. Their walks are kept in build/answers/kept: after a stop the same command goes on.
 ANSWERS := build/answers$(if $(QUICK),-quick)
 STUDY_landscape := landscape learned
-STUDY_when := when learned --generations 30
+STUDY_when := when learned
 STUDY_toe := toe learned
 STUDY_effects := effects learned
 STUDY_controls := controls learned

@@ -24,7 +24,7 @@ from ..task.observation_entries import PERSON_OBSERVATION
 
 PERSONS_FOLDER = Path(__file__).parent / "persons"
 """Folder of the persons that come with the package."""
-PERSON_SEEDS = (1, 2)
+PERSON_SEEDS = (1, 2, 3, 4)
 """Seeds of the trainings of the persons that come with the package, `springfoot train --preset person --seed SEED`."""
 LEARNED = {"learned": "learned-1"} | {name: name for name in (f"learned-{seed}" for seed in PERSON_SEEDS)}
 """Name of a person of this package -> its file in `PERSONS_FOLDER`, without suffix: the training's last policy."""

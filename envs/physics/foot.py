@@ -55,8 +55,8 @@ class Spring:
 LOCK = Spring(stiffness=50_000.0, damping_time=0.01)
 """Spring that locks a joint at 0: 100 N m, an ankle's largest moment in walking, move it by 0.1 deg. Chosen: with a
 damping time of five physics steps or more, moments are as with any stiffer or softer lock (5 000 to 100 000 N
-m/rad). The fibre work changes little: on a rigid right foot that of the learned person is 3.58 J/kg/m at 20 000, 3.66
-here, 3.71 at 100 000 (63 kg, 1.2 m/s asked, 1.18, 1.20, 1.21 walked; 20 episodes of 5 s).
+m/rad). The fibre work changes little: on a rigid right foot that of an earlier learned person was 3.58 J/kg/m at
+20 000, 3.66 here, 3.71 at 100 000 (63 kg, 1.2 m/s asked, 1.18, 1.20, 1.21 walked; 20 episodes of 5 s).
 
 MuJoCo solves contacts with the inertia M, and moves the joints by M + h K beta, h the physics step. Without an
 armature (`envs.physics.model.armatures_of`), contacts take a locked foot for a light one that swings freely, and give

@@ -130,9 +130,9 @@ class ToeJoint(PersonsStudy):
             "the locked one, and its 95 % interval over persons: of one person over its starts, which "
             "say nothing of others. Springs in N·m/rad, at a sound toe beside its muscles. "
             f"Persons: {', '.join(self.persons)}; {self.what_ran} of each toe and commanded speed, {asked} m/s; falls "
-            "are of all. People's effects are of docs/effects.csv; McDonald's people had one such foot. `learned` "
-            "learned with locked and absent toes and passive feet on one side alone, and each with springs of 10 to "
-            "180: where locked is far from a spring of 1000, suspect the person, not the toe."
+            "are of all. People's effects are of docs/effects.csv; McDonald's people had one such foot. Persons of the "
+            "package learned with locked and absent toes, passive feet, and springs of 10 to 180 beside the toe: where "
+            "locked is far from a spring of 1000, suspect the person, not the toe."
         )
 
     def _commanded_speeds(self) -> Sequence[float]:

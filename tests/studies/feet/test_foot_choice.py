@@ -62,7 +62,7 @@ def test_what_is_said_follows_from_prices_csv(tmp_path, capsys):
     text = capsys.readouterr().out
     rows = read(tmp_path / "feet" / "prices.csv")
     (speed,) = {float(row["speed_m_s"]) for row in rows}
-    assert f"**Compared at {speed:.2f} m/s walked, as on no foot all persons reach the asked 1.1 m/s." in text
+    assert f"**Compared at {speed:.2f} m/s walked, as not on every foot all persons reach the asked 1.1 m/s." in text
     (line,) = (line for line in text.splitlines() if line.startswith("| 6 N·m/deg"))
     cells = [cell.strip() for cell in line.split("|")]
     for column, place in (("fibre_J_kg_m", 4), ("effort", 6)):
