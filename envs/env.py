@@ -121,8 +121,8 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
     | 41  | command_speed           | sqrt(g l)   | 0    | 2   | commanded speed (Froude speed)            |
     | 42  | height_ratio            | 1           | 0    | 2   | height / 1.70 m                           |
 
-    Where the action moves the person, 38 further entries tell the last offsets, whether the action sets the stiffness,
-    the slope, the stiffness now, feet and body, and the length of the planned steps
+    Where the action moves the person, 40 further entries tell the last offsets, whether the action sets the stiffness,
+    the slope, the stiffness now, feet and body, the length of the planned steps, the mean speed's error and the aim
     (`springfoot.envs.task.observation_entries`).
 
     ## Rewards

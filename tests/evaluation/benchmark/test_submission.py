@@ -35,13 +35,13 @@ TASK = "Walk-v0"
 
 @pytest.fixture(scope="module")
 def submitted(tmp_path_factory):
-    """A submission of a policy's file, very soft, and a committed one of springs."""
+    """A submission of a policy's file, so soft that the tuned legs soon fall, and a committed one of springs."""
     folder = tmp_path_factory.mktemp("submissions")
-    policy = read_policy("pretrained")
+    policy = read_policy("predicted")
     soft = replace(policy, biases=(*policy.biases[:-1], np.full_like(policy.biases[-1], -100.0)))
     save_policy(folder / "soft.safetensors", soft)
     return [
-        benchmark.submit(str(folder / "soft.safetensors"), "Prosthesis-v0", "ours", folder / "ours", threads=1),
+        benchmark.submit(str(folder / "soft.safetensors"), "FromThePlan-v0", "ours", folder / "ours", threads=1),
         benchmark.read_submission(REPOSITORY / "benchmarks" / "submissions" / TASK / "constant"),
     ]
 
@@ -57,6 +57,7 @@ def copied(submission, folder):
 
 @pytest.mark.slow
 def test_a_submission_is_judged_to_the_same_bits_on_any_number_of_threads(submitted, tmp_path):
+    """Of one that walks to the end, and one that soon falls."""
     # Of two tasks, so no table has both; `test_a_table_is_in_the_order_of_returns` has several rows.
     both = [submitted[0], benchmark.submit("pretrained", TASK, "walks", tmp_path / "mine", threads=1)]
     kept = tmp_path / "judged"
@@ -67,6 +68,7 @@ def test_a_submission_is_judged_to_the_same_bits_on_any_number_of_threads(submit
     assert [each["same_bits"] for each in judged.values()] == [True, True]
     rows = judged_rows(kept)
     means = {each.name: each.walks.returns.mean() for each in both}
+    assert [each.walks.fell.mean() for each in both] == pytest.approx([1.0, 0.0], abs=0.1)
     assert [row.submission.name for row in rows] == sorted(means, key=lambda name: -means[name])
     for row in rows:
         told = judged[row.submission.name]

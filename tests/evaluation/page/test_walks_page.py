@@ -208,7 +208,9 @@ def test_a_fall_is_shown_as_a_fall(chromium, page):
     assert "fell in 1 of 2 episodes. Shown: the mean stride of the others." in said.inner_text()
     assert curves.count() == 10 and tab.locator("#where").inner_text().endswith("% of the stride")
     box.check()
-    assert "Shown: the end of an episode, after " in said.inner_text() and "(fell: " in said.inner_text()
+    fall = data_of(page)["cells"][SOFT]["fall"]
+    assert fall["reason"].startswith("fell: ")
+    assert f"Shown: the end of an episode, after {fall['after']:.1f} s ({fall['reason']})." in said.inner_text()
     assert curves.count() == 0 and tab.locator("#where").inner_text() == "0.00 s"
     box.uncheck()
     tab.locator("#pace").select_option(index=1)  # at 1.5 m/s both fall
