@@ -1,12 +1,11 @@
 """Let a learned person walk: a network in the step moves the rest angles of hips, knees and ankles every 20 ms.
 
 The network is a mirrored policy (`springfoot.agents.policies.policy`) of a training with `acts` "both" or "person". It
-acts by its mean action, on the observation without noise, with the entries for a stiffness that others
-set. Its sums run in one order for any number of bodies: the bits do not depend on the batch.
+acts by its mean action, on the observation without noise, with the entries for a stiffness that others set.
 """
 
 from itertools import pairwise
-from math import radians, tanh
+from math import radians
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +15,11 @@ from springfoot.arrays import NDArray
 from springfoot.errors import SpringfootError
 from springfoot.files.tensor_file import digest_of_file, read_tensors
 
-from ..physics.kernel import kernel
 from ..physics.model import ACTIONS, MOVED, PERSON_ACTIONS, SIDES
 from ..settings.settings import FARTHEST_OFFSET_DEG, FASTEST_AIM
 from ..task.mirror import mirror_of
 from ..task.observation_entries import PERSON_OBSERVATION
+from .leg_network import LARGEST_INPUT, move_legs
 
 PERSONS_FOLDER = Path(__file__).parent / "persons"
 """Folder of the persons that come with the package."""
@@ -49,43 +48,6 @@ def person_file(name: str) -> Path:
     return path
 
 
-@kernel
-def _act(observation, acting, mean, deviation, clip, index, sign, weights, biases, offsets) -> None:
-    """Fill the offsets of the bodies `acting` (N,): the last three outputs of the network for each leg, in [-1, 1].
-
-    Args:
-        observation: (N, D) float32.
-        acting: (N,) bool; the offsets of other bodies stay.
-        mean, deviation: (D,) of the observations in training.
-        clip: largest magnitude of a normalised entry.
-        index, sign: (D,) of the mirror image, see `springfoot.envs.task.mirror`.
-        weights: of each layer, (inputs, outputs).
-        biases: of each layer, (outputs,).
-        offsets: (N, side, 3), hip, knee and ankle.
-    """
-    entries = len(mean)
-    for i in range(len(observation)):
-        if not acting[i]:
-            continue
-        for side in range(2):
-            layer_input = np.empty(entries)
-            for k in range(entries):
-                seen = observation[i, k] if side == 0 else observation[i, index[k]] * sign[k]
-                layer_input[k] = min(max((seen - mean[k]) / deviation[k], -clip), clip)
-            for layer in range(len(weights)):
-                weight = weights[layer]
-                output = biases[layer].copy()
-                for k in range(len(layer_input)):
-                    for unit in range(len(output)):
-                        output[unit] += layer_input[k] * weight[k, unit]
-                if layer < len(weights) - 1:  # activations stand between the layers
-                    for unit in range(len(output)):
-                        output[unit] = tanh(output[unit])
-                layer_input = output
-            for joint in range(3):
-                offsets[i, side, joint] = min(max(layer_input[len(layer_input) - 3 + joint], -1.0), 1.0)
-
-
 class LearnedPerson:
     """The network of a person, read from its file.
 
@@ -105,15 +67,15 @@ class LearnedPerson:
         """Its setting `aim_rate` [1/s]."""
         mirror = mirror_of(PERSON_NAMES, _action_names(settings))
         layers = range(len(network["layer_sizes"]) - 1)
-        clip = np.inf if network["observation_clip"] is None else float(network["observation_clip"])
+        clip = LARGEST_INPUT if network["observation_clip"] is None else float(network["observation_clip"])
         self._network = (
             tensors["observation.mean"].astype(float),
             np.sqrt(tensors["observation.variance"].astype(float) + network["variance_floor"]),
             clip,
             mirror.index,
             mirror.sign.astype(float),
-            tuple(np.ascontiguousarray(tensors[f"layer.{layer}.weight"].T, float) for layer in layers),
-            tuple(tensors[f"layer.{layer}.bias"].astype(float) for layer in layers),
+            tuple(np.ascontiguousarray(tensors[f"layer.{layer}.weight"].T, np.float32) for layer in layers),
+            tuple(tensors[f"layer.{layer}.bias"].astype(np.float32) for layer in layers),
         )
 
     def offsets(self, observation: NDArray, acting: NDArray) -> NDArray:
@@ -125,7 +87,7 @@ class LearnedPerson:
         """
         observation[:, _OF_STIFFNESS] = 0.0
         offsets = np.zeros((len(observation), len(SIDES), len(MOVED)))
-        _act(observation, acting, *self._network, offsets)
+        move_legs(observation, acting, *self._network, offsets)
         return self._scale * offsets
 
 

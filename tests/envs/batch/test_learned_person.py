@@ -70,6 +70,16 @@ def test_the_network_in_the_step_does_what_its_policy_does(file) -> None:
     assert np.abs(moved).max() > 0.01
 
 
+def test_the_network_is_that_of_the_policy_in_single_precision(file) -> None:
+    policy = person()
+    learned = LearnedPerson(file, "people")
+    observation = np.random.default_rng(2).standard_normal((200, len(PERSON_NAMES))).astype(np.float32)
+    observation *= np.geomspace(1e-3, 1e3, 200, dtype=np.float32)[:, None]  # up to where tanh is 1
+    offsets = learned.offsets(observation, np.ones(200, bool)).reshape(200, 6)
+    expected = np.radians(BOTH.person_range_deg) * policy(observation)[:, 4:]
+    np.testing.assert_allclose(offsets, expected, atol=1e-6)
+
+
 def test_mirrored_bodies_have_mirrored_offsets_to_the_bit(file) -> None:
     mirror = mirror_of(PERSON_NAMES, ACTIONS)
     learned = LearnedPerson(file, "people")
