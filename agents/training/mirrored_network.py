@@ -4,6 +4,7 @@ z: normalised observation, z': that of the mirrored world. The actor gives f(z) 
 their images of the right leg; the critic values g(z) + g(z'), so that a state and its image are worth the same.
 """
 
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -22,14 +23,15 @@ class MirroredNetwork(ActorCriticPolicy):
     """stable-baselines3's MLP policy on both images of an observation, with one action layer and one exploration for
     both legs.
 
-    It needs observations normalised alike on both sides, as by `MirroredMeanStd`. All other arguments are those of
-    `ActorCriticPolicy`.
+    It needs observations normalised alike on both sides, as by `MirroredMeanStd`. With `side_by_side`, actor and critic
+    compute on two threads, with the same bits. All other arguments are those of `ActorCriticPolicy`.
     """
 
     _legs_order: torch.Tensor
 
-    def __init__(self, *arguments: Any, mirror: Mirror, **keywords: Any) -> None:
+    def __init__(self, *arguments: Any, mirror: Mirror, side_by_side: bool = False, **keywords: Any) -> None:
         self.mirror = mirror  # before the layers, which are built in there
+        self._side_by_side = side_by_side
         super().__init__(*arguments, **keywords)
 
     def _build(self, lr_schedule: Schedule) -> None:
@@ -46,6 +48,7 @@ class MirroredNetwork(ActorCriticPolicy):
             activation_fn=self.activation_fn,
             device=self.device,
             mirror=self.mirror,
+            side_by_side=self._side_by_side,
         )
 
     def _get_action_dist_from_latent(self, latent_pi: torch.Tensor) -> Distribution:
@@ -64,10 +67,23 @@ class _BothImages(MlpExtractor):
     _index: torch.Tensor
     _sign: torch.Tensor
 
-    def __init__(self, *arguments: Any, mirror: Mirror, **keywords: Any) -> None:
+    def __init__(self, *arguments: Any, mirror: Mirror, side_by_side: bool, **keywords: Any) -> None:
         super().__init__(*arguments, **keywords)
         self.register_buffer("_index", torch.from_numpy(mirror.index), persistent=False)
         self.register_buffer("_sign", torch.from_numpy(mirror.sign.astype(np.float32)), persistent=False)
+        self._second_thread = ThreadPoolExecutor(1) if side_by_side else None
+
+    def forward(self, features: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        """Return the last hidden layers, of H units, of the actor (N, 2, H) and the critic (N, H) for observations (N,
+        D)."""
+        images = self._with_images(features)
+        if self._second_thread:
+            actor, critic = _SideBySide.apply(
+                images, self.policy_net, self.value_net, self._second_thread, *self.parameters()
+            )
+        else:
+            actor, critic = self.policy_net(images), self.value_net(images)
+        return actor, critic.sum(-2)
 
     def forward_actor(self, features: torch.Tensor) -> torch.Tensor:
         """Return the actor's last hidden layer, of H units, for observations (N, D) and their images: (N, 2, H)."""
@@ -80,6 +96,46 @@ class _BothImages(MlpExtractor):
     def _with_images(self, features: torch.Tensor) -> torch.Tensor:
         """Return normalised observations (N, D) with their mirror images, (N, 2, D): the image has index 1."""
         return torch.stack((features, features[..., self._index] * self._sign), -2)
+
+
+class _SideBySide(torch.autograd.Function):
+    """Two networks on the same input, each forward and backward on its own thread; torch alone goes backward through
+    both on one. The bits are the same."""
+
+    @staticmethod
+    def forward(
+        ctx: Any,
+        given: torch.Tensor,
+        one: torch.nn.Module,
+        other: torch.nn.Module,
+        second_thread: ThreadPoolExecutor,
+        *parameters: torch.Tensor,
+    ) -> tuple[torch.Tensor, torch.Tensor]:
+        """Return the outputs of both networks for the input `given`; `parameters` are those of `one`, then of
+        `other`."""
+
+        def output_of(network: torch.nn.Module) -> torch.Tensor:
+            with torch.enable_grad():
+                return network(given)
+
+        later = second_thread.submit(output_of, other)
+        ctx.outputs = output_of(one), later.result()
+        ctx.second_thread = second_thread
+        ctx.parameters = [list(network.parameters()) for network in (one, other)]
+        return ctx.outputs[0].detach(), ctx.outputs[1].detach()
+
+    @staticmethod
+    def backward(ctx: Any, *gradients: torch.Tensor) -> tuple[torch.Tensor | None, ...]:
+        """Return the gradients of the parameters from those of the outputs; None where a network does not learn."""
+
+        def gradients_of(network: int) -> tuple[torch.Tensor | None, ...]:
+            output, parameters = ctx.outputs[network], ctx.parameters[network]
+            if not output.requires_grad:
+                return (None,) * len(parameters)
+            return torch.autograd.grad(output, parameters, gradients[network])
+
+        later = ctx.second_thread.submit(gradients_of, 1)
+        return None, None, None, None, *gradients_of(0), *later.result()
 
 
 class MirroredMeanStd(RunningMeanStd):

@@ -57,10 +57,11 @@ class Learner:
 
     As stable-baselines3 makes them, weights are orthogonal and biases zero; with gain 0.01 on the action layer the mean
     action begins near 0. Observations and rewards are normalised by their running statistics. If the configuration is
-    `mirrored`, network and statistics come from the module `mirrored_network`.
+    `mirrored`, network and statistics come from the module `mirrored_network`; with several `threads` its actor and
+    critic compute side by side on the CPU, with the same bits.
     """
 
-    def __init__(self, config: TrainingConfig, environments: VecEnv, seed: int) -> None:
+    def __init__(self, config: TrainingConfig, environments: VecEnv, seed: int, threads: int = 1) -> None:
         if config.device == "cuda" and not torch.cuda.is_available():
             raise SpringfootError("device cuda needs a GPU that torch finds; there is none, give cpu")
         torch.set_num_threads(1)  # more would compete with the physics' threads, up to 200 times slower
@@ -74,7 +75,7 @@ class Learner:
         if config.mirrored:
             (biped,) = environments.get_attr("biped", 0)
             self._mirror = mirror_of(biped.observation_names, biped.action_names)
-            network["mirror"] = self._mirror
+            network |= {"mirror": self._mirror, "side_by_side": threads > 1 and config.device == "cpu"}
             self.normalized.obs_rms = MirroredMeanStd(self._mirror)
         self.rollout_steps = config.update_steps // config.num_envs
         samples = self.rollout_steps * config.num_envs

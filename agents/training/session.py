@@ -76,7 +76,7 @@ class Session(BaseCallback):
         self._fingerprint = fingerprint(self._evaluation)
         # A seed of 29 bits: the environments count on from it, and evaluations begin at 2^30.
         seed = int(np.random.SeedSequence([config.seed, 0]).generate_state(1)[0] >> 3)
-        self.learner = Learner(config, self._environments, seed)
+        self.learner = Learner(config, self._environments, seed, threads)
         self._begun_from = {} if begin is None else {"begun_from": self._begin_with(begin)}
         self._stopping = Stopping()
         self._began = monotonic()

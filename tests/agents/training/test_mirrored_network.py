@@ -121,6 +121,19 @@ def test_state_is_all_there_is_to_a_mirrored_learner(learner):
         plain.restore(state)
 
 
+@pytest.mark.parametrize("critic_steps", [0, 600])
+def test_actor_and_critic_side_by_side_learn_the_same_bits(critic_steps):
+    config = dataclasses.replace(CONFIG, critic_steps=critic_steps)
+    states = []
+    for threads in (1, 2):
+        environments = SegmentedFootBipedVecEnv(CONFIG.num_envs, episode_seconds=1.0)
+        made = Learner(config, environments, seed=0, threads=threads)
+        made.ppo.learn(2 * CONFIG.update_steps)
+        states.append({name: array.tobytes() for name, array in made.state().items()})
+        environments.close()
+    assert states[0] == states[1]
+
+
 def test_its_model_of_stable_baselines3_is_a_mirrored_policy(learner, rows):
     policy = policy_from_sb3(learner.ppo, ignore_unvaried=True)
     assert np.array_equal(policy(rows), learner.policy({})(rows)) and policy.header["network"]["mirrored"] is True
