@@ -12,6 +12,7 @@ from springfoot.cli.main import STUDIES
 from springfoot.command_line import field_help
 from springfoot.envs.env import SegmentedFootBiped
 from springfoot.envs.settings.settings import THEME_OF, THEMES, BipedSettings
+from springfoot.envs.task.observation_entries import OBSERVATION, PERSON_OBSERVATION
 from springfoot.evaluation.benchmark.leaderboard import leaderboard
 from springfoot.files.markdown import table
 
@@ -73,11 +74,20 @@ def commands() -> str:
 
 
 def observations() -> str:
-    """Return the page of the environment: its docstring, with a link in place of its list of settings."""
+    """Return the page of the environment: its docstring, with the entries of a person's observation in place of the
+    module that lists them, and a link in place of its list of settings."""
     before, _, rest = inspect.getdoc(SegmentedFootBiped).partition("## Arguments")
+    before = before.replace("\n(`springfoot.envs.task.observation_entries`).", f":\n\n{_person_entries()}")
     after = rest.partition("\nand `render_mode`")[2]
     settings_line = "Every [setting](settings.md), and `render_mode`"
     return f"# Observations, actions, reward\n\n{before}## Arguments\n{settings_line}{after}".rstrip()
+
+
+def _person_entries() -> str:
+    """Return the table of the entries that only a person observes."""
+    entries = enumerate(PERSON_OBSERVATION[len(OBSERVATION) :], len(OBSERVATION))
+    rows = [(str(n), one.name, one.unit, f"{one.low:g}", f"{one.high:g}", one.meaning) for n, one in entries]
+    return table(["Num", "Observation", "Divided by", "Min", "Max", "Meaning"], rows)
 
 
 def policies() -> str:

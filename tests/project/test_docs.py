@@ -19,6 +19,7 @@ from springfoot.cli.export import ExportFlags
 from springfoot.cli.live import LiveFlags
 from springfoot.cli.main import STUDIES, main, study_class
 from springfoot.cli.train import TrainFlags
+from springfoot.envs.task.observation_entries import PERSON_OBSERVATION
 from springfoot.gait import human_gait
 from springfoot.studies.feet.foot_choice import FootChoice
 from springfoot.studies.springs.person import Person
@@ -85,6 +86,13 @@ def test_the_reference_is_the_code_s():
     for name, text in generated["pages"]().items():
         page = generated["FOLDER"] / f"{name}.md"
         assert page.read_text(encoding="utf-8") == text, "`make docs` writes it anew"
+
+
+def test_the_reference_lists_every_entry_of_an_observation():
+    page = (ROOT / "docs" / "reference" / "observations.md").read_text()
+    found = re.findall(r"^\| (\d+) +\| (\w+) ", page, re.MULTILINE)
+    expected = [(str(number), entry.name) for number, entry in enumerate(PERSON_OBSERVATION)]
+    assert [row for row in found if row in expected] == expected
 
 
 def test_every_page_is_reachable_from_the_index():
