@@ -4,8 +4,9 @@ The contract describes inputs and outputs: names, units, order and bounds. Neith
 """
 
 import json
+from collections.abc import Sequence
 from importlib.metadata import version
-from math import e
+from math import e, radians
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,9 +19,9 @@ from springfoot.envs.control.foot_rows import controlled_joints
 from springfoot.envs.control.phase_table import SAMPLES
 from springfoot.envs.control.reference_walk import reference_walks, rows
 from springfoot.envs.control.stiffness_control import stiffness_of
-from springfoot.envs.physics.model import ACTIONS, SIDES
+from springfoot.envs.physics.model import ACTIONS, PERSON_ACTIONS, SIDES, actions_of
 from springfoot.envs.settings.settings import BipedSettings, body_of
-from springfoot.envs.task.observation import OBSERVATION
+from springfoot.envs.task.observation_entries import entries_of
 from springfoot.errors import SpringfootError
 from springfoot.files.writing import require_new_files, write_new
 from springfoot.gait.body.body import REFERENCE_HEIGHT, REFERENCE_MASS, Body
@@ -40,15 +41,15 @@ def export_policy(policy: Policy, out: str | Path) -> list[Path]:
         policy: policy of this version, from `read_policy`.
         out: new file, ending in .onnx. Beside it appears its contract, OUT.json.
 
-    The graph takes the raw observation (N, D) and returns the action (N, A) and the stiffness it sets (`Scale`) in
-    float32, the actions within 1e-5 of the policy's own. Raises `SpringfootError`, with nothing written, for another
+    The graph takes the raw observation (N, D) and returns the action (N, A), and what it sets: stiffness (`Scale`),
+    offsets of a person's rest angles (`OFFSETS`), or both. All are float32, the actions within 1e-5 of the policy's
+    own. Raises `SpringfootError`, with nothing written, for another
     ending, for files that exist, and without the package onnx.
     """
     files = planned_files(out)
-    scale = scale_of(policy.settings)
     contract = json.dumps(contract_of(policy), indent=1, allow_nan=False) + "\n"
     try:
-        content = onnx_bytes(policy, scale, contract)
+        content = onnx_bytes(policy, contract)
     except ModuleNotFoundError as error:
         raise SpringfootError(f"an export needs the package {error.name}: pip install 'springfoot[onnx]'") from None
     write_new(dict(zip(files, [content, contract.encode()], strict=True)))
@@ -68,15 +69,18 @@ def planned_files(out: str | Path) -> list[Path]:
     return files
 
 
-CONTRACT_VERSION = 1
-"""Version of the contract's layout."""
+CONTRACT_VERSION = 2
+"""Version of the contract's layout; 1 knew no person."""
+OFFSETS = "rest_angle_offset"
+"""Output of a policy that moves a person: how far the rest angles of hips, knees and ankles are moved [rad]."""
 SCHEDULE_STEP = SAMPLES // 100
 """Samples of a stride between two values of a schedule in the contract: one percent."""
 PACKAGES = ("springfoot", "mujoco", "numpy")
 
 
 class Scale(NamedTuple):
-    """Second output of an exported policy, the meaning of its actions: middle x factor^action for each set joint.
+    """Output of an exported policy, the meaning of its actions on the stiffness: middle x factor^action for each set
+    joint.
 
     In absolute mode the output is `stiffness` [N m/rad] of the body of 1.70 m and 63 kg; in residual mode, where an
     action is a factor on the schedule, `stiffness_factor` [-].
@@ -95,8 +99,11 @@ class Scale(NamedTuple):
     """(joints,) output at action 1 over that at action 0."""
 
 
-def scale_of(settings: BipedSettings) -> Scale:
-    """Return the `Scale` by which a policy's actions become stiffnesses in an environment of these settings."""
+def scale_of(settings: BipedSettings) -> Scale | None:
+    """Return the `Scale` by which a policy's actions become stiffnesses in an environment of these settings; None where
+    no action is one."""
+    if settings.acts == "person":
+        return None
     joints = np.flatnonzero(controlled_joints(settings)).tolist()
     if settings.action_mode == "residual":
         # An action a multiplies the schedule by e^a.
@@ -121,35 +128,28 @@ def two_floats(value: NDArray) -> tuple[NDArray, NDArray]:
 def contract_of(policy: Policy) -> dict[str, Any]:
     """Return the contract of a policy, as plain JSON values; docs/how-to/policies.md explains its entries."""
     settings = policy.settings
-    scale = scale_of(settings)
     header = policy.header
-    # (joint, stiffness at action -1, stiffness at action 1)
-    bounds = zip(scale.joints, scale.middle / scale.factor, scale.middle * scale.factor, strict=True)
+    observed = entries_of(settings.acts)
+    actions = actions_of(settings.acts)
     contract = {
         "contract_version": CONTRACT_VERSION,
         "observation": {
-            "shape": ["N", len(OBSERVATION)],
+            "shape": ["N", len(observed)],
             "dtype": "float32",
             "values": "finite, as the environment gives them: SI divided by the unit, within low and high; "
             "g is gravity, l the leg length of the body (hip to floor when standing)",
             "entries": [
                 {"name": entry.name, "unit": entry.unit, "low": entry.low, "high": entry.high, "meaning": entry.meaning}
-                for entry in OBSERVATION
+                for entry in observed
             ],
         },
         "action": {
-            "shape": ["N", len(ACTIONS)],
+            "shape": ["N", len(actions)],
             "unit": "1",
-            "entries": [{"name": name, "low": -1.0, "high": 1.0} for name in ACTIONS],
+            "entries": [{"name": name, "low": -1.0, "high": 1.0} for name in actions],
         },
-        scale.name: {
-            "shape": ["N", len(scale.joints)],
-            "unit": scale.unit,
-            "entries": [  # rounded: without the last bits' noise
-                {"name": ACTIONS[joint], "low": round(float(low), 9), "high": round(float(high), 9)}
-                for joint, low, high in bounds
-            ],
-        },
+        **_stiffness(scale_of(settings)),
+        **_offsets(settings),
         "body": {
             "height_m": REFERENCE_HEIGHT,
             "mass_kg": REFERENCE_MASS,
@@ -161,7 +161,30 @@ def contract_of(policy: Policy) -> dict[str, Any]:
         "fingerprint": header["fingerprint"],
         "versions": {name: version(name) for name in PACKAGES},
     }
-    return contract if settings.action_mode == "absolute" else contract | {"schedule": _schedule(settings)}
+    multiplied = settings.acts != "person" and settings.action_mode == "residual"
+    return contract | {"schedule": _schedule(settings)} if multiplied else contract
+
+
+def _stiffness(scale: Scale | None) -> dict[str, Any]:
+    """Return the contract's entry on the output of a `Scale`, by its name; empty for None."""
+    if scale is None:
+        return {}
+    # (joint, stiffness at action -1, stiffness at action 1)
+    bounds = zip(scale.joints, scale.middle / scale.factor, scale.middle * scale.factor, strict=True)
+    entries = [  # rounded: without the last bits' noise
+        {"name": ACTIONS[joint], "low": round(float(low), 9), "high": round(float(high), 9)}
+        for joint, low, high in bounds
+    ]
+    return {scale.name: {"shape": ["N", len(entries)], "unit": scale.unit, "entries": entries}}
+
+
+def _offsets(settings: BipedSettings) -> dict[str, Any]:
+    """Return the contract's entry on `OFFSETS`, by its name; empty for a policy that moves no person."""
+    if settings.acts == "stiffness":
+        return {}
+    farthest = radians(settings.person_range_deg)
+    entries = [{"name": name, "low": -farthest, "high": farthest} for name in PERSON_ACTIONS]
+    return {OFFSETS: {"shape": ["N", len(entries)], "unit": "rad", "entries": entries}}
 
 
 def _schedule(settings: BipedSettings) -> dict[str, Any]:
@@ -191,10 +214,11 @@ OPERATORS = {"tanh": "Tanh", "relu": "Relu", "leaky_relu": "LeakyRelu", "elu": "
 """Activation -> ONNX operator with the same function; silu has none."""
 
 
-def onnx_bytes(policy: Policy, scale: Scale, contract: str) -> bytes:
-    """Return the content of the ONNX file: input `observation` (N, D), outputs `action` (N, A) and `scale.name`.
+def onnx_bytes(policy: Policy, contract: str) -> bytes:
+    """Return the content of the ONNX file: input `observation` (N, D), outputs `action` (N, A), and by its name that of
+    the `Scale`, then `OFFSETS`, where the policy has them.
 
-    The graph computes `Policy.__call__` in float32, then `scale`. The metadata holds `contract`.
+    The graph computes `Policy.__call__` in float32, then what its actions set. The metadata holds `contract`.
     """
     import onnx  # an extra of its own
     from onnx import helper, numpy_helper
@@ -241,15 +265,25 @@ def onnx_bytes(policy: Policy, scale: Scale, contract: str) -> bytes:
         x = node("Concat", x, output_of(node("Mul", image, constant(mirror.sign))), axis=1)
         x = node("Gather", x, constant(mirror.legs_order, np.int64), axis=1)
     action = node("Tanh", x, name="action") if policy.output == "tanh" else clip(x, 1.0, "action")
-    # The second output: middle x factor^action of the joints that an action sets.
-    power = node("Pow", constant(scale.factor), node("Gather", action, constant(scale.joints, np.int64), axis=1))
-    node("Mul", constant(scale.middle), power, name=scale.name)
+
+    def actions_at(places: Sequence[int]) -> str:
+        """Add to the graph the actions at these places; return the name of the output."""
+        return node("Gather", action, constant(places, np.int64), axis=1)
 
     def float_rows(name: str, width: int) -> Any:
         return helper.make_tensor_value_info(name, onnx.TensorProto.FLOAT, ["N", width])
 
     inputs = [float_rows("observation", policy.layer_sizes[0])]
-    outputs = [float_rows("action", policy.action_count), float_rows(scale.name, len(scale.joints))]
+    outputs = [float_rows("action", policy.action_count)]
+    if (scale := scale_of(policy.settings)) is not None:
+        power = node("Pow", constant(scale.factor), actions_at(scale.joints))
+        node("Mul", constant(scale.middle), power, name=scale.name)
+        outputs.append(float_rows(scale.name, len(scale.joints)))
+    if policy.settings.acts != "stiffness":
+        farthest = constant(radians(policy.settings.person_range_deg))
+        offsets = range(policy.action_count - len(PERSON_ACTIONS), policy.action_count)
+        node("Mul", farthest, actions_at(offsets), name=OFFSETS)
+        outputs.append(float_rows(OFFSETS, len(PERSON_ACTIONS)))
     graph = helper.make_graph(nodes, "springfoot", inputs, outputs, constants)
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=IR_VERSION)
     model.producer_name = "springfoot"

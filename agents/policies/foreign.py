@@ -19,7 +19,7 @@ import numpy as np
 
 from springfoot.arrays import NDArray
 from springfoot.envs.batch.biped_batch import Biped
-from springfoot.envs.physics.model import ACTIONS
+from springfoot.envs.physics.model import actions_of
 from springfoot.envs.settings.settings import BipedSettings, settings_from
 from springfoot.envs.task.observation_entries import OBSERVATION
 from springfoot.errors import SpringfootError
@@ -76,14 +76,15 @@ class ForeignPolicy:
             returned = self.act(batch)
         if np.iscomplexobj(returned):
             raise SpringfootError(f"{self.name} must return real actions, returned complex ones")
+        expected = len(batch), len(actions_of(self.settings.acts))
         try:
             actions = np.asarray(returned)
         except (TypeError, ValueError):
             actions = np.array(None)  # no numbers: refused next
         if actions.dtype.kind not in "biuf":  # bool, whole numbers, floats
-            raise SpringfootError(f"{self.name} must return actions ({len(batch)}, 4), returned no numbers")
-        if actions.shape != (len(batch), len(ACTIONS)):
-            raise SpringfootError(f"{self.name} must return actions ({len(batch)}, 4), returned {actions.shape}")
+            raise SpringfootError(f"{self.name} must return actions {expected}, returned no numbers")
+        if actions.shape != expected:
+            raise SpringfootError(f"{self.name} must return actions {expected}, returned {actions.shape}")
         if not np.isfinite(actions).all():
             raise SpringfootError(f"{self.name} returned an action that is not finite")
         return actions.astype(np.float64).reshape(*rows.shape[:-1], -1).clip(-1.0, 1.0).astype(np.float32)
@@ -103,7 +104,7 @@ def onnx_policy(path: Path) -> ForeignPolicy:
         import onnxruntime  # noqa: F401  # likewise
     except ModuleNotFoundError as error:
         raise SpringfootError(f"{path} needs the package {error.name}: pip install 'springfoot[onnx]'") from None
-    session, failed = onnx_session(path, np.zeros((2, len(OBSERVATION))))  # the real ones follow, of its environment
+    session, _ = onnx_session(path, np.zeros((2, len(OBSERVATION))))  # the real ones follow, of its environment
     inputs = session.get_inputs()
     outputs = [output.name for output in session.get_outputs()]
     if len(inputs) != 1:
@@ -116,8 +117,7 @@ def onnx_policy(path: Path) -> ForeignPolicy:
     width = len(biped.observation_names)
     if len(node.shape) not in (1, 2) or (isinstance(node.shape[-1], int) and node.shape[-1] != width):
         raise SpringfootError(f"{path}: its input must be (N, {width}), is ({', '.join(map(str, node.shape))})")
-    if len(failed) < len(FORMS):  # it runs on zeros in one form at least
-        session, failed = onnx_session(path, _first_observations(biped))
+    session, failed = onnx_session(path, _first_observations(biped))
     if len(failed) == len(FORMS):
         raise SpringfootError(f"{path} fails on observations (2, {width}): {failed[FORMS[0]]}")
     output = "action" if "action" in outputs else outputs[0]
@@ -142,7 +142,7 @@ def function_policy(name: str) -> ForeignPolicy:
 
     The module is one that Python finds, else one in the current folder. An attribute `settings` of the function, a
     mapping or `BipedSettings`, describes its task. Raises `SpringfootError`, one line, if module or function are
-    missing, and if it returns other values than four finite actions for the first observations of two episodes.
+    missing, and if it returns other values than finite actions (N, A) for the first observations of two episodes.
     """
     module_name, _, function_name = name.partition(":")
     if os.getcwd() not in sys.path:

@@ -29,7 +29,7 @@ from ..control.worn_feet import WornFeet
 from ..physics.contact import CONTACTS
 from ..physics.foot import Feet
 from ..physics.measurement import Measurement
-from ..physics.model import ACTIONS, JOINTS, PERSON_ACTIONS, SIDES
+from ..physics.model import ACTIONS, JOINTS, PERSON_ACTIONS, SIDES, actions_of
 from ..physics.simulation import MjData, MjModel, Simulation
 from ..physics.timing import CONTROL_WINDOW, WINDOWS_PER_ACTION_STEP
 from ..settings.checks import real_numbers
@@ -87,7 +87,7 @@ class Biped(ExactState):
         self.on_tick: Callable[[Tick], None] | None = None
         self._acts_on_stiffness = settings.acts != "person"
         self._acts_as_person = settings.acts != "stiffness"
-        self.action_names = ACTIONS * self._acts_on_stiffness + PERSON_ACTIONS * self._acts_as_person
+        self.action_names = actions_of(settings.acts)
         """Name of each action, those of the stiffness first."""
         walks = [reference_walks(of_body, legs) for of_body in settings_of_bodies(settings)]
         self.walks = walks[0]

@@ -15,7 +15,7 @@ from springfoot.arrays import NDArray
 from springfoot.errors import SpringfootError
 from springfoot.files.tensor_file import digest_of_file, read_tensors
 
-from ..physics.model import ACTIONS, MOVED, PERSON_ACTIONS, SIDES
+from ..physics.model import ACTIONS, MOVED, SIDES, actions_of
 from ..settings.settings import FARTHEST_OFFSET_DEG, FASTEST_AIM
 from ..task.mirror import mirror_of
 from ..task.observation_entries import PERSON_OBSERVATION
@@ -65,7 +65,7 @@ class LearnedPerson:
         self._scale = radians(settings["person_range_deg"])
         self.aim_rate: float = settings.get("aim_rate", 0.0)
         """Its setting `aim_rate` [1/s]."""
-        mirror = mirror_of(PERSON_NAMES, _action_names(settings))
+        mirror = mirror_of(PERSON_NAMES, actions_of(settings["acts"]))
         layers = range(len(network["layer_sizes"]) - 1)
         clip = LARGEST_INPUT if network["observation_clip"] is None else float(network["observation_clip"])
         self._network = (
@@ -94,11 +94,6 @@ class LearnedPerson:
 def digest_of_person(name: str) -> str:
     """Return the SHA-256 digest, as text, of the file of the person `name` (`person_file`)."""
     return digest_of_file(person_file(name))
-
-
-def _action_names(settings: dict[str, Any]) -> tuple[str, ...]:
-    """Return the names of a person's actions; with `acts` "both" those on the stiffness come first."""
-    return ACTIONS + PERSON_ACTIONS if settings["acts"] == "both" else PERSON_ACTIONS
 
 
 def _read_person(path: Path) -> tuple[dict[str, Any], dict[str, Any], dict[str, NDArray]]:
@@ -130,7 +125,7 @@ def _is_person(network: dict[str, Any], settings: dict[str, Any], tensors: dict[
     Raises an exception of Python's for entries that are missing or of another type.
     """
     sizes = network["layer_sizes"]
-    ends = [len(PERSON_NAMES), len(_action_names(settings)) // 2]
+    ends = [len(PERSON_NAMES), len(actions_of(settings["acts"])) // 2]
     shapes = {"observation.mean": (sizes[0],), "observation.variance": (sizes[0],)}
     for layer, (inputs, outputs) in enumerate(pairwise(sizes)):
         shapes |= {f"layer.{layer}.weight": (outputs, inputs), f"layer.{layer}.bias": (outputs,)}

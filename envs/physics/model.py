@@ -63,6 +63,11 @@ JOINT_RANGE_DEG = ((-60.0, 120.0), (-10.0, 150.0), (-60.0, 45.0), (-45.0, 90.0))
 _SIGN_AXIS = {"hip": -1.0, "knee": 1.0, "ankle": -1.0, "toe": -1.0}  # about +y a vector turns from z to x
 
 
+def actions_of(acts: str) -> tuple[str, ...]:
+    """Return the names of the actions with the setting `acts`, those of the stiffness first."""
+    return ACTIONS * (acts != "person") + PERSON_ACTIONS * (acts != "stiffness")
+
+
 def damping_times(body: Body) -> np.ndarray:
     """Return beta [s] of each joint in the order of `JOINTS`, shape (4,)."""
     return np.array(DAMPING_TIME) * sqrt(body.length_scale)

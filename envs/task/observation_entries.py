@@ -117,3 +117,8 @@ body and load. No entry shows the mass of the body, as mechanics scale with it (
 PERSON_OBSERVATION = OBSERVATION + _person_entries()
 """Every entry of the observation where the action moves the person: `OBSERVATION`, and the entries of a person.
 Stiffness is over that unit at 1.70 m and 63 kg, scaled with mass x height; `aim` follows the setting `aim_rate`."""
+
+
+def entries_of(acts: str) -> tuple[Entry, ...]:
+    """Return the entries of the observation with the setting `acts`."""
+    return OBSERVATION if acts == "stiffness" else PERSON_OBSERVATION

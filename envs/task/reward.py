@@ -27,7 +27,7 @@ from ..physics.timing import ACTION_STEP
 from ..settings.settings import DEFAULT_WEIGHTS, BipedSettings
 from .episode_end import is_alive
 from .observation import HIGH, LOW, observe, units_of
-from .observation_entries import OBSERVATION, PERSON_OBSERVATION
+from .observation_entries import entries_of
 from .scales import body_scales
 from .state import TASK_ROW
 from .target import error_of, target_curves, targets_at, track
@@ -334,7 +334,7 @@ class Task:
         subjects: Subjects,
         feet: Sequence[Feet],
     ) -> None:
-        entries = OBSERVATION if settings.acts == "stiffness" else PERSON_OBSERVATION
+        entries = entries_of(settings.acts)
         self.names = tuple(entry.name for entry in entries)
         self.low = LOW[: len(entries)]
         self.high = HIGH[: len(entries)]

@@ -14,13 +14,16 @@ from springfoot.agents.policies.export import contract_of
 from springfoot.agents.policies.policy import ACTIVATIONS, Output
 from springfoot.agents.training.returns import evaluate_returns
 from springfoot.envs.batch.biped_batch import Biped
-from springfoot.envs.physics.model import ACTIONS, SIDES
+from springfoot.envs.physics.model import ACTIONS, SIDES, actions_of
 from springfoot.envs.settings.settings import settings_from, settings_to_json
-from springfoot.envs.task.observation import OBSERVATION
+from springfoot.envs.task.observation_entries import OBSERVATION, PERSON_OBSERVATION
 from springfoot.errors import SpringfootError
 
 D = len(OBSERVATION)
 LOW, HIGH = np.array([(entry.low, entry.high) for entry in OBSERVATION]).T
+
+
+ELEVEN = np.radians(11)
 
 
 def play_onnx(path):
@@ -55,7 +58,8 @@ def drawn(
     **settings,
 ):
     """A policy of random weights that reaches both ends of its actions."""
-    sizes = (*sizes[:-1], 2) if mirrored else sizes
+    sizes = (*sizes[:-1], 2) if mirrored and sizes[0] == D else sizes
+    least = 1e-6 if clip else 1.0
     random = np.random.default_rng(2)
     layers = [(random.normal(0, 1 / np.sqrt(i), (o, i)), random.normal(0, 0.2, o)) for i, o in pairwise(sizes)]
     layers[-1] = (0.5 * layers[-1][0], layers[-1][1])
@@ -64,8 +68,8 @@ def drawn(
         settings,
         activation=activation,
         output=output,
-        observation_mean=random.normal(size=D),
-        observation_variance=np.where(np.arange(D) % 7, random.uniform(0.5, 2.0, D), 1e-6 if clip else 1.0),
+        observation_mean=random.normal(size=sizes[0]),
+        observation_variance=np.where(np.arange(sizes[0]) % 7, random.uniform(0.5, 2.0, sizes[0]), least),
         observation_clip=clip,
         mirrored=mirrored,
     )
@@ -144,6 +148,29 @@ def test_an_export_of_a_mirrored_policy_mirrors_to_the_bit(activation, tmp_path)
         assert image.tobytes() == np.take(action, policy.mirror.action_index, -1).tobytes()
     assert contract_of(policy)["network"]["mirrored"] is True
     assert np.array_equal(load_policy(tmp_path / "walk.onnx")(rows), play(rows)[0])
+
+
+@pytest.mark.parametrize(
+    ("acts", "sets"), [("person", ["rest_angle_offset"]), ("both", ["stiffness_factor", "rest_angle_offset"])]
+)
+def test_an_export_of_a_person_acts_as_the_policy_does_and_tells_the_offsets(acts, sets, tmp_path):
+    width, count = len(PERSON_OBSERVATION), len(actions_of(acts))
+    policy = drawn(sizes=(width, 24, count // 2), mirrored=True, acts=acts, action_mode="residual", person_range_deg=11)
+    assert policy.mirror is not None
+    rows = np.random.default_rng(0).normal(size=(500, width)).astype(np.float32)
+    session = exported(policy, tmp_path)
+    action, *others = session(rows)
+    expected = policy(rows)
+    assert action.shape == (500, count) and np.abs(action - expected).max() <= 1e-5
+    assert others[-1] == pytest.approx(np.radians(11) * expected[:, -6:], abs=1e-6)
+    contract = json.loads((tmp_path / "walk.onnx.json").read_text())
+    assert list(contract)[3 : 3 + len(others)] == sets
+    assert [entry["name"] for entry in contract["observation"]["entries"]] == [one.name for one in PERSON_OBSERVATION]
+    assert [entry["name"] for entry in contract["action"]["entries"]] == list(actions_of(acts))
+    assert contract["rest_angle_offset"]["entries"][0] == {"name": "rest_hip_left", "low": -ELEVEN, "high": ELEVEN}
+    assert session(policy.mirror.of(rows))[0].tobytes() == action[:, policy.mirror.action_index].tobytes()
+    again = load_policy(tmp_path / "walk.onnx")
+    assert again.settings == policy.settings and np.array_equal(again(rows), action)
 
 
 def test_the_contract_names_everything_in_its_order_and_nothing_of_where_or_when():
