@@ -157,7 +157,7 @@ def links_table(links: Sequence[Link]) -> str:
         here = {link.condition: link for link in links if (link.inner, link.outer) == names}
         level = here[conditions[0]]
         falls = [f"{here[name].inner_falls}, {here[name].outer_falls} of {here[name].episodes}" for name in conditions]
-        lines.append([" ⊂ ".join(names), text_of(level.inner_mean, ".2f"), _difference(level), *falls])
+        lines.append([" → ".join(names), text_of(level.inner_mean, ".2f"), _difference(level), *falls])
     unit = UNIT_OF_AIM[links[0].aim]
     return table(["classes", f"inner, {unit}", f"outer less inner, {unit}", *conditions], lines)
 

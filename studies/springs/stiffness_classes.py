@@ -5,6 +5,7 @@ multiplies the ankle's K by exp(sum of gain x error). The parts of a class divid
 gains may be 0, so that each class has every stiffness of the class before it, to the bit.
 """
 
+from collections import deque
 from dataclasses import dataclass
 from math import ceil
 
@@ -44,6 +45,8 @@ class StiffnessClass:
     """The same of the toe."""
     gains: tuple[float, ...] = ()
     """The same of the ankle's gains; empty without a reflex."""
+    late: int = 0
+    """Steps by which the errors that a reflex reads are older than the body's; at first it reads the first ones."""
 
     @property
     def size(self) -> int:
@@ -59,12 +62,13 @@ class StiffnessClass:
     def policy(self, vectors: ArrayLike, settings: BipedSettings) -> PolicyFunction:
         """Return the policy for N environments that sets in each the stiffness of its row of `vectors` (N, size).
 
-        K stays within the ranges of the settings.
+        K stays within the ranges of the settings. A reflex that is `late` remembers errors: its policy is for one walk.
         """
         ankle, toe, gains = self.split(vectors)
         rows = np.arange(len(ankle))[:, None]  # (N, 1), beside indices (N, side)
         body = body_of(settings)
         centre = np.array(CENTRE) * body.stiffness_scale
+        read: deque[NDArray] = deque(maxlen=self.late + 1)  # the errors of the last steps
 
         def act(observation: NDArray) -> NDArray:
             """Return the actions (N, 4) for observations (N, D): K by part of the stride, the ankle's times exp(sum of
@@ -74,9 +78,9 @@ class StiffnessClass:
                 [ankle[rows, _part_index(self.ankle, phase)], toe[rows, _part_index(self.toe, phase)]], axis=-1
             )
             if self.gains:
-                errors = observation[:, _ERROR_COLUMNS] / _ERROR_SIZES
+                read.append(observation[:, _ERROR_COLUMNS] / _ERROR_SIZES)
                 of_phase = gains[rows, :, _part_index(self.gains, phase)]  # (N, side, error)
-                logs[..., 0] += (of_phase * errors[:, None]).sum(-1)
+                logs[..., 0] += (of_phase * read[0][:, None]).sum(-1)
             action = action_of(centre * np.exp(logs), settings, body)
             return action.reshape(len(observation), -1).astype(np.float32)
 

@@ -5,11 +5,12 @@
 Four classes of stiffness, each within the next (`stiffness_classes`): constant, by phase, open loop, linear reflex. At
 each link the inner and the outer class go on from the same stiffness with the same number of walks, by CMA-ES, so that
 both have had equally many; then both walk from starts that no search has walked from, and are compared episode by
-episode. There are two aims, each with its own searches: least fibre work a metre, and least distance from people.
+episode. There are two aims, each with its own searches: least fibre work a metre, and least distance from people. At
+last the reflex walks the same test with errors that reach it late.
 """
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache, partial
 from itertools import pairwise, product
 from pathlib import Path
@@ -24,6 +25,7 @@ from matplotlib.figure import Figure
 from springfoot.agents.policies import find_policy
 from springfoot.arrays import NDArray
 from springfoot.envs.batch import Biped
+from springfoot.envs.physics import ACTION_STEP
 from springfoot.envs.settings import BipedSettings
 from springfoot.errors import MOST_COUNT, SpringfootError, require_count, require_number
 from springfoot.evaluation.numbers import measure
@@ -43,6 +45,8 @@ FALL_COST = 4.0
 """Cost of a search if every episode falls, in the aim's unit; chosen: as much as the number itself."""
 HELD_SPEED = 0.1
 """Difference from the commanded speed that costs as much as all falls, by its square [m/s]; chosen."""
+LATE = (2, 4)
+"""Steps of 20 ms by which a reflex is late; chosen: 40 and 80 ms."""
 NO_WALK = 3 * FALL_COST
 """Cost of a stiffness with which no stride could be measured."""
 FIRST_SPREAD = 0.2
@@ -122,7 +126,7 @@ class When(WalkingStudy):
         """Return the simulated time of all walks if none falls [s]."""
         links = len(self._classes) - 1
         searched = (1 + 2 * links) * (self.generations * self.population + 2 * CHOOSING)
-        tested = 2 * links * len(self._conditions) * self.episodes
+        tested = (2 * links + len(LATE)) * len(self._conditions) * self.episodes
         return len(self.aims) * (searched + tested) * self.seconds
 
     def ask(self, progress: OnProgress) -> Answer:
@@ -138,18 +142,36 @@ class When(WalkingStudy):
             went_on = self._search(kept, aim, inner, best[aim], outer, progress)
             best[aim] = self._search(kept, aim, outer, widened(best[aim], inner, outer), outer, progress)
             found.append((aim, outer, best[aim]))
-            for condition in self._conditions:
-                walks = [
-                    self._test_numbers(kept, of_class, vector, condition, progress)
-                    for of_class, vector in ((inner, went_on), (outer, best[aim]))
-                ]
-                links.append(compared(aim, (inner.name, outer.name), condition.words, *walks))
+            links += self._links(kept, aim, (inner, outer), (went_on, best[aim]), progress)
+        *_, reflex = self._classes
+        for steps, aim in product(LATE, self.aims):
+            late = replace(reflex, name=f"{1000 * steps * ACTION_STEP:.0f} ms late", late=steps)
+            links += self._links(kept, aim, (reflex, late), (best[aim], best[aim]), progress)
         files = {
             "links.csv": csv_text(list(asdict(links[0])), [list(asdict(link).values()) for link in links]),
             "stiffness.csv": _stiffness_csv(found),
             "stiffness.png": partial(draw, found=found),
         }
         return Answer(text=self._text(links), files=files)
+
+    def _links(
+        self,
+        kept: Kept,
+        aim: str,
+        classes: tuple[StiffnessClass, StiffnessClass],
+        vectors: tuple[NDArray, NDArray],
+        progress: OnProgress,
+    ) -> list[Link]:
+        """Walk the test under each condition with two classes, each by its vector, and return the comparisons."""
+        names = (classes[0].name, classes[1].name)
+        links = []
+        for condition in self._conditions:
+            walks = [
+                self._test_numbers(kept, of_class, vector, condition, progress)
+                for of_class, vector in zip(classes, vectors, strict=True)
+            ]
+            links.append(compared(aim, names, condition.words, *walks))
+        return links
 
     def _search(
         self,
@@ -269,7 +291,8 @@ class When(WalkingStudy):
                 f"episodes), and in brackets the smallest difference seen with a chance of {100 * POWER:g} %. Falls of "
                 f"inner, outer: episodes in which one alone falls show a difference {seen} (McNemar). Each search "
                 f"walks {self.generations} × {self.population} candidates, pushed by ±{self.pushes[0]:g} N. A reflex "
-                "plus a network is left out. A difference of exactly 0: no search of the link found better than its "
+                "plus a network is left out. A late reflex is the same one, whose errors are of 40 or 80 ms before. "
+                "A difference of exactly 0: no search of the link found better than its "
                 "start, which says little of what a longer one would find.",
             ]
         )

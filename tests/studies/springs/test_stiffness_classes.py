@@ -1,5 +1,6 @@
 """Classes of stiffness: each has the stiffness of the class before it to the bit, within the settings' bounds."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -81,6 +82,19 @@ def test_a_gain_acts_on_its_error_in_its_phase_on_the_ankle_alone():
     actions = reflex.policy(np.tile(vector, (2, 1)), SETTINGS)(seen).reshape(2, 2, 2).astype(float)
     without, with_error = stiffness_of(actions, SETTINGS, body_of(SETTINGS))
     np.testing.assert_allclose(with_error / without, [[np.exp(0.5), 1.0], [1.0, 1.0]], rtol=1e-5)
+
+
+def test_a_late_reflex_acts_as_the_reflex_did_on_the_errors_of_some_steps_before():
+    reflex = CLASSES[3]
+    vectors = np.random.default_rng(0).normal(0, 0.2, (1, reflex.size))
+    late = replace(reflex, late=2).policy(vectors, SETTINGS)
+    seen = np.repeat(observations(1), 6, axis=0)
+    columns = [NAMES.index(name) for name in ERRORS]
+    seen[:, columns] = 0.05 * np.random.default_rng(1).normal(size=(6, len(columns)))
+    acted = [late(row[None]) for row in seen]
+    at_once = reflex.policy(vectors, SETTINGS)
+    for step, action in enumerate(acted):
+        assert action.tobytes() == at_once(seen[max(step - 2, 0), None]).tobytes()  # the phase is the same throughout
 
 
 def test_stiffness_stays_within_the_bounds_of_the_settings():
