@@ -7,6 +7,7 @@ file does not tell where or when it was made. `Policy` needs NumPy only, so a po
 from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cached_property
 from importlib import resources
 from itertools import pairwise
 from pathlib import Path
@@ -16,6 +17,7 @@ import numpy as np
 
 from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.batch.learned_person import LEARNED, POLICY_ENTRIES, person_file
+from springfoot.envs.batch.leg_network import LegNetwork
 from springfoot.envs.settings.settings import BipedSettings, settings_from, settings_to_json, with_bodies_of_model
 from springfoot.envs.task.mirror import Mirror, mirror_of
 from springfoot.errors import SpringfootError, perhaps, quoted
@@ -137,7 +139,22 @@ class Policy:
         rows = observation_rows(observation, len(self.observation_mean))
         if self.mirror is None:
             return self._output_of(rows)
+        if self._legs is not None:
+            bodies = np.atleast_2d(rows).astype(np.float32)
+            left, right = np.moveaxis(self._legs(bodies, np.ones(len(bodies), bool)), 1, 0)
+            return self.mirror.both_legs(left, right).reshape(*rows.shape[:-1], -1)
         return self.mirror.both_legs(self._output_of(rows), self._output_of(self.mirror.of(rows)))
+
+    @cached_property
+    def _legs(self) -> LegNetwork | None:
+        """Return the network as a person in the step has it, a fifth of the time of `_output_of`; None for other
+        forms."""
+        deviation = self.observation_deviation
+        if self.mirror is None or self.activation != "tanh" or self.output != "clip" or not deviation.min() > 0.0:
+            return None
+        return LegNetwork(
+            self.observation_mean, deviation, self.observation_clip, self.mirror, self.weights, self.biases
+        )
 
     def _output_of(self, rows: np.ndarray) -> np.ndarray:
         """Return the network's output in [-1, 1], float32, for raw observations (..., D), float64 and finite.

@@ -15,11 +15,11 @@ from springfoot.arrays import NDArray
 from springfoot.errors import SpringfootError
 from springfoot.files.tensor_file import digest_of_file, read_tensors
 
-from ..physics.model import ACTIONS, MOVED, SIDES, actions_of
+from ..physics.model import ACTIONS, MOVED, actions_of
 from ..settings.settings import FARTHEST_OFFSET_DEG, FASTEST_AIM
 from ..task.mirror import mirror_of
 from ..task.observation_entries import PERSON_OBSERVATION
-from .leg_network import LARGEST_INPUT, move_legs
+from .leg_network import LegNetwork
 
 PERSONS_FOLDER = Path(__file__).parent / "persons"
 """Folder of the persons that come with the package."""
@@ -67,15 +67,13 @@ class LearnedPerson:
         """Its setting `aim_rate` [1/s]."""
         mirror = mirror_of(PERSON_NAMES, actions_of(settings["acts"]))
         layers = range(len(network["layer_sizes"]) - 1)
-        clip = LARGEST_INPUT if network["observation_clip"] is None else float(network["observation_clip"])
-        self._network = (
-            tensors["observation.mean"].astype(float),
+        self._network = LegNetwork(
+            tensors["observation.mean"],
             np.sqrt(tensors["observation.variance"].astype(float) + network["variance_floor"]),
-            clip,
-            mirror.index,
-            mirror.sign.astype(float),
-            tuple(np.ascontiguousarray(tensors[f"layer.{layer}.weight"].T, np.float32) for layer in layers),
-            tuple(tensors[f"layer.{layer}.bias"].astype(np.float32) for layer in layers),
+            network["observation_clip"],
+            mirror,
+            [tensors[f"layer.{layer}.weight"] for layer in layers],
+            [tensors[f"layer.{layer}.bias"] for layer in layers],
         )
 
     def offsets(self, observation: NDArray, acting: NDArray) -> NDArray:
@@ -86,9 +84,8 @@ class LearnedPerson:
         changed to 0.
         """
         observation[:, _OF_STIFFNESS] = 0.0
-        offsets = np.zeros((len(observation), len(SIDES), len(MOVED)))
-        move_legs(observation, acting, *self._network, offsets)
-        return self._scale * offsets
+        # a leg's last actions; those on the stiffness, if any, come first
+        return self._scale * self._network(observation, acting)[..., -len(MOVED) :].astype(float)
 
 
 def digest_of_person(name: str) -> str:

@@ -1,12 +1,19 @@
 """Compute a mirrored network of tanh layers for both legs of each body, in single precision as it was trained.
 
-Both legs pass through a layer together, so that each weight is read once. The sums run in one order for any number of
+A person walks by it inside the step, and a policy of this form acts by it (`springfoot.agents.policies.policy`). Both
+legs pass through a layer together, so that each weight is read once. The sums run in one order for any number of
 bodies, and the same for both legs: the bits depend neither on the batch nor on the side.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from springfoot.arrays import NDArray
+
 from ..physics.kernel import kernel, part
+from ..physics.model import SIDES
+from ..task.mirror import Mirror
 
 LARGEST_INPUT = 1e20
 """Largest magnitude of a normalised entry [-]; chosen: sums of products with weights stay finite in single
@@ -67,18 +74,18 @@ def _layer(weight, bias, left, right, left_output, right_output) -> None:
 
 
 @kernel
-def move_legs(observation, acting, mean, deviation, clip, index, sign, weights, biases, offsets) -> None:
-    """Fill the offsets of the bodies `acting` (N,): the last three outputs of the network for each leg, in [-1, 1].
+def _act(observation, acting, mean, deviation, clip, index, sign, weights, biases, actions) -> None:
+    """Fill the actions of the bodies `acting` (N,): the outputs of the network for each leg, clipped to [-1, 1].
 
     Args:
         observation: (N, D) float32.
-        acting: (N,) bool; the offsets of other bodies stay.
+        acting: (N,) bool; the actions of other bodies stay.
         mean, deviation: (D,) of the observations in training.
         clip: largest magnitude of a normalised entry.
         index, sign: (D,) of the mirror image, see `springfoot.envs.task.mirror`.
         weights: of each layer, (inputs, outputs) float32.
         biases: of each layer, (outputs,) float32.
-        offsets: (N, side, 3), hip, knee and ankle.
+        actions: (N, side, A/2).
     """
     entries = len(mean)
     for i in range(len(observation)):
@@ -98,5 +105,44 @@ def move_legs(observation, acting, mean, deviation, clip, index, sign, weights, 
                 _tanh(outputs[1])
             legs = outputs
         for side in range(2):
-            for joint in range(3):
-                offsets[i, side, joint] = min(max(legs[side, joint - 3], -1.0), 1.0)
+            for k in range(actions.shape[2]):
+                actions[i, side, k] = min(max(legs[side, k], -1.0), 1.0)
+
+
+class LegNetwork:
+    """A mirrored network of tanh layers whose outputs, clipped to [-1, 1], are the actions of a leg.
+
+    Args:
+        mean, deviation: (D,) of the observations in training; no deviation is 0.
+        clip: largest magnitude of a normalised observation; None for no limit.
+        mirror: of its observations.
+        weights: of each layer, (outputs, inputs).
+        biases: of each layer, (outputs,).
+    """
+
+    def __init__(
+        self,
+        mean: NDArray,
+        deviation: NDArray,
+        clip: float | None,
+        mirror: Mirror,
+        weights: Sequence[NDArray],
+        biases: Sequence[NDArray],
+    ) -> None:
+        self._numbers = (
+            mean.astype(float),
+            deviation.astype(float),
+            LARGEST_INPUT if clip is None else min(float(clip), LARGEST_INPUT),
+            mirror.index,
+            mirror.sign.astype(float),
+            tuple(np.ascontiguousarray(weight.T, np.float32) for weight in weights),
+            tuple(bias.astype(np.float32) for bias in biases),
+        )
+        self._outputs = len(biases[-1])
+
+    def __call__(self, observation: NDArray, acting: NDArray) -> NDArray:
+        """Return the actions (N, side, A/2) for observations (N, D) float32, those of the right leg as their images on
+        the left; 0 for bodies that are not `acting` (N,)."""
+        actions = np.zeros((len(observation), len(SIDES), self._outputs), np.float32)
+        _act(observation, acting, *self._numbers, actions)
+        return actions
