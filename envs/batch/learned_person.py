@@ -23,7 +23,7 @@ from .leg_network import LegNetwork
 
 PERSONS_FOLDER = Path(__file__).parent / "persons"
 """Folder of the persons that come with the package."""
-PERSON_SEEDS = (1, 2, 3, 4)
+PERSON_SEEDS = (1, 2, 3, 4, 5)
 """Seeds of the trainings of the persons that come with the package, `springfoot train --preset person --seed SEED`."""
 LEARNED = {"learned": "learned-1"} | {name: name for name in (f"learned-{seed}" for seed in PERSON_SEEDS)}
 """Name of a person of this package -> its file in `PERSONS_FOLDER`, without suffix: the training's last policy."""

@@ -206,7 +206,7 @@ class BipedSettings:
     knees and ankles, every 20 ms; or both (`springfoot.envs.control.person_actions`)."""
     person: str = field(default="tuned", metadata=_PERSON)
     """Who walks where the action sets stiffness alone: the tuned rest angles (tuned); a person of the package, who
-    has learned other feet, bodies and slopes (learned, learned-2 to learned-4); or another one, a policy file of
+    has learned other feet, bodies and slopes (learned, learned-2 to learned-5); or another one, a policy file of
     `springfoot train --preset person`."""
     person_range_deg: float = field(default=14.0, metadata=_PERSON)
     """Largest offset of a rest angle, that of an action of 1 [0..30 deg]."""

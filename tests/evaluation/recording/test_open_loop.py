@@ -208,7 +208,7 @@ ERRORS = [
         "frozen:nobody",
         "no policy 'nobody': give a .safetensors or .onnx file, a run folder, a schedule in a .csv or .json file, "
         "module:function, frozen:POLICY, or one of pretrained, medium, predicted, learned, learned-2, learned-3, "
-        "learned-4, "
+        "learned-4, learned-5, "
         f"{', '.join(BASELINES)}",
     ),
 ]
