@@ -37,7 +37,7 @@ class EvaluateFlags:
     learned-5, untrained, random, constant (300/40 N m/rad; constant:ANKLE,TOE for others), schedule (of the leg tuning,
     or --schedule; schedule:FACTOR for a multiple), quasi_stiffness, thesis, thesis_printed. A .csv or .json file is a
     stiffness schedule or a table of finite states, as an evaluation writes them. frozen:POLICY is a trained policy's
-    mean stiffness over the stride, played open loop at the same equilibrium."""
+    mean stiffness over the stride, played open loop at the same rest angles."""
     episodes: int = 20
     """Number of episodes."""
     seconds: float = 20.0

@@ -19,7 +19,7 @@ from springfoot.agents.training import PRESETS
 from springfoot.arrays import NDArray
 from springfoot.envs import Biped, BipedSettings
 from springfoot.envs.physics import Feet
-from springfoot.errors import SpringfootError, require_count
+from springfoot.errors import require_count
 from springfoot.evaluation.numbers import mean_speed, measure
 from springfoot.evaluation.recording import TICK, WARM_UP, Episodes, policy_and_settings, record, record_walk
 from springfoot.files.markdown import MISSING, table, text_of
@@ -117,19 +117,17 @@ def speed_errors(episodes: Sequence[DrawnEpisode]) -> NDArray:
 class Persons(WalkingStudy):
     """Walk learned persons on drawn bodies, feet, speeds and slopes, and on sound feet beside people."""
 
-    persons: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="PERSON ...")] = ()
-    """Policies that move the person: run folders or files."""
+    persons: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="PERSON ...")] = ("learned",)
+    """Policies that move the person: run folders, files, or those of the package, such as `learned`."""
     drawn: int = 2000
     """Drawn episodes of each person, and as many pushed."""
 
     QUICK: ClassVar = {"episodes": 1, "seconds": 6.0, "drawn": 2}
 
     def check(self) -> None:
-        """Refuse counts out of range, and no person."""
+        """Refuse counts out of range."""
         super().check()
         require_count("drawn", self.drawn)
-        if not self.persons:
-            raise SpringfootError("name one or more persons: folders or files of train.py --preset person")
 
     @property
     def total(self) -> float:
