@@ -11,6 +11,7 @@ from springfoot.agents.policies import SHIPPED
 from springfoot.cli.main import STUDIES
 from springfoot.command_line import field_help
 from springfoot.envs.env import SegmentedFootBiped
+from springfoot.envs.settings.feet import KINDS, ORTHOSIS_NUMBERS, SEGMENT_RATIOS
 from springfoot.envs.settings.settings import THEME_OF, THEMES, BipedSettings
 from springfoot.envs.task.observation_entries import OBSERVATION, PERSON_OBSERVATION
 from springfoot.evaluation.benchmark.leaderboard import leaderboard
@@ -49,6 +50,18 @@ def _names(head: list[str], rows: list[tuple[str, ...]]) -> str:
     return f'<div class="names" markdown>\n\n{table(head, rows)}\n\n</div>'
 
 
+def _foot_numbers() -> str:
+    """Return the table of the numbers of feet, with their ranges."""
+    owners = {f"`{kind}`": numbers for kind, numbers in KINDS.items() if numbers}
+    owners |= {"`orthosis` of every kind": ORTHOSIS_NUMBERS, "every kind": SEGMENT_RATIOS}
+    rows = [
+        (owner, f"`{name}`", "" if one.usual is None else f"{one.usual:g}", f"{one.low:g} to {one.high:g}", one.unit)
+        for owner, numbers in owners.items()
+        for name, one in numbers.items()
+    ]
+    return _names(["foot", "number", "default", "range", "unit"], rows)
+
+
 def settings() -> str:
     """Return the page of every setting of environment and training."""
     head = ["setting", "default", "meaning"]
@@ -56,6 +69,7 @@ def settings() -> str:
     for theme, words in THEMES.items():
         names = [name for name, its in THEME_OF.items() if its == theme]
         parts += [f"## {theme.capitalize()}", words, _names(head, list(_rows(BipedSettings, names)))]
+    parts += ["## Numbers of a foot", "Of the dictionaries of `left_foot` and `right_foot`.", _foot_numbers()]
     parts += ["## Training", "Flags of `springfoot train`.", _names(head, list(_rows(TrainingConfig)))]
     return "\n\n".join(parts)
 
