@@ -21,12 +21,12 @@ import tyro
 from springfoot.agents.policies.policy import read_policy
 from springfoot.agents.training.config import PRESETS
 from springfoot.agents.training.training import train
+from springfoot.envs.control import GENERIC
 from springfoot.envs.control.constants import leg_constants
 from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.evaluation.recording.recording import record
 from springfoot.gait.people.human import PEOPLE_FILE
 from springfoot.studies.searches.constants_file import read_constants, write_constants
-from springfoot.studies.searches.generic_constants import GENERIC
 from springfoot.studies.searches.leg_tuning import LegTuning
 
 

@@ -19,11 +19,13 @@ if TYPE_CHECKING:
     from .standing import SLOW_SPEED
     from .stiffness_control import FEET, action_of, stiffness_of, stiffness_ranges
     from .subjects import DRAWN, Subjects
+    from .untuned_legs import GENERIC, generic_constants
 
 __all__ = [
     "DRAWN",
     "FED",
     "FEET",
+    "GENERIC",
     "GRID",
     "KNOTS",
     "PLATEAUS",
@@ -37,6 +39,7 @@ __all__ = [
     "constants_from",
     "constants_name",
     "foot_curves",
+    "generic_constants",
     "leg_constants",
     "plateau_curve",
     "reference_walk_at",
@@ -52,6 +55,7 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
             "DRAWN": "subjects",
             "FED": "reference_walk",
             "FEET": "stiffness_control",
+            "GENERIC": "untuned_legs",
             "GRID": "phase_table",
             "KNOTS": "constants",
             "PLATEAUS": "equilibrium",
@@ -65,6 +69,7 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
             "constants_from": "constants",
             "constants_name": "constants",
             "foot_curves": "equilibrium",
+            "generic_constants": "untuned_legs",
             "leg_constants": "constants",
             "plateau_curve": "equilibrium",
             "reference_walk_at": "reference_walk",

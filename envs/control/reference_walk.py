@@ -27,6 +27,7 @@ from ..settings.settings import BipedSettings, body_of, plan_file_of, reference_
 from .constants import LegConstants, leg_constants
 from .phase_table import GRID
 from .standing import SLOW_SPEED
+from .untuned_legs import generic_constants
 
 SPACING = 0.1
 """Distance of tabulated speeds [m/s at 1.70 m, scaled with the square root of height]; chosen: half-way between them
@@ -72,7 +73,7 @@ def reference_walks(settings: BipedSettings, legs: Sequence[LegConstants] | None
     asked = " and ".join(f"{name} {value}" for name, value in given.items() if value is not None)
     walks = []
     for speed in tabulated_speeds(settings):
-        constants = legs or _tuned_constants(settings, speed)
+        constants = legs or _constants(settings, speed)
         try:
             walks.append(reference_walk_at(settings, float(speed), constants))
         except SpringfootError as error:
@@ -87,7 +88,7 @@ def reference_walk_at(
     """Return the walk of the settings' body at `speed` [m/s]; `legs` as for `reference_walks`."""
     body = body_of(settings)
     people = reference_gait(settings, speed)
-    legs = legs or _tuned_constants(settings, speed)
+    legs = legs or _constants(settings, speed)
     if settings.follows_plan:
         style = least_work(speed / sqrt(body.length_scale), plan_file_of(settings))
         plan = plan_walk(body, speed, settings.cadence, human=people, style=style)
@@ -108,8 +109,13 @@ def reference_walk_at(
     )
 
 
-def _tuned_constants(settings: BipedSettings, speed: float) -> list[LegConstants]:
-    """Return the tuned constants for the settings' body at `speed` [m/s], one variant."""
+def _constants(settings: BipedSettings, speed: float) -> list[LegConstants]:
+    """Return the constants for the settings' body at `speed` [m/s], one variant.
+
+    They are the tuned ones, but a learned person that follows the plan begins at generic ones.
+    """
+    if settings.follows_plan and settings.has_learned_legs:
+        return [generic_constants()]
     equal_speed = speed / sqrt(body_of(settings).length_scale)  # of a body of 1.70 m
     named_by = settings.equilibrium, settings.cadence, equal_speed, settings.feedforward, settings.follows_plan
     return [leg_constants(*named_by, plan_file_of(settings))]

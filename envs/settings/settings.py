@@ -316,6 +316,11 @@ class BipedSettings:
         return self.guide == "plan"
 
     @property
+    def has_learned_legs(self) -> bool:
+        """Return True if a network moves the rest angles of the legs: a learned person, or the policy itself."""
+        return self.acts != "stiffness" or self.person != "tuned"
+
+    @property
     def step_seconds(self) -> float:
         """Return the time of one step of the environment [s]."""
         return {"100hz": 0.5, "25hz": 2.0}.get(self.decisions, 1.0) * ACTION_STEP  # 20 ms in all other cases

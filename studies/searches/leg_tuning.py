@@ -20,7 +20,15 @@ import tyro
 from tqdm import tqdm
 
 from springfoot.arrays import NDArray
-from springfoot.envs.control import TUNED_SPEED, LegConstants, constants_from, constants_name, reference_walk_at
+from springfoot.envs.control import (
+    GENERIC,
+    TUNED_SPEED,
+    LegConstants,
+    constants_from,
+    constants_name,
+    generic_constants,
+    reference_walk_at,
+)
 from springfoot.envs.settings import BipedSettings, Feedforward, Guide
 from springfoot.errors import SpringfootError, require_count, require_number
 from springfoot.files.writing import csv_text
@@ -29,7 +37,6 @@ from springfoot.gait.plan import Cadence, least_work
 from ..base.study import Answer, OnProgress, Study
 from .cma_search import asked_of, generations
 from .constants_file import CONSTANTS, read_constants, write_constants
-from .generic_constants import GENERIC, generic_constants
 from .leg_cost import REFINED_SECONDS, Pays, all_misses, cost
 from .leg_vector import Search
 

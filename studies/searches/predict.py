@@ -19,7 +19,7 @@ from typing import Annotated, Any, ClassVar
 import tyro
 
 from springfoot.agents.training import PRESETS
-from springfoot.envs.control import constants_name
+from springfoot.envs.control import GENERIC, constants_name
 from springfoot.envs.settings import BipedSettings
 from springfoot.errors import require_count
 from springfoot.files.locks import owned
@@ -30,7 +30,6 @@ from ..base.pushed_walks import PushedWalks, kept_metrics
 from ..base.study import Answer, OnProgress, WalkingStudy, without_places
 from ..base.trained import finish_training
 from .constants_file import read_constants, write_constants
-from .generic_constants import GENERIC
 from .leg_tuning import LegTuning
 from .plan_tuning import PlanTuning
 from .prediction_table import people_numbers, plan_numbers, prediction_table, walk_numbers

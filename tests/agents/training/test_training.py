@@ -17,10 +17,11 @@ from springfoot.agents.training.ppo import Learner
 from springfoot.agents.training.returns import EVALUATION_SEED, evaluate_returns
 from springfoot.agents.training.sb3_vec_env import SegmentedFootBipedVecEnv
 from springfoot.envs.batch.biped_batch import Biped
-from springfoot.envs.settings.settings import BipedSettings
+from springfoot.envs.settings.settings import DEFAULT_WEIGHTS, BipedSettings
 from springfoot.errors import SpringfootError
 from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.files.json_file import read_object
+from springfoot.gait.plan.effort import PRICES
 
 SHORT = TrainingConfig(
     timesteps=3_000,
@@ -84,6 +85,13 @@ def test_a_policy_of_any_body_reads_speed_and_height_and_is_evaluated_on_one_bod
 @pytest.mark.parametrize("config", [SHORT, dataclasses.replace(SHORT, mirrored=True), *PRESETS.values()])
 def test_configuration_survives_json(config):
     assert config_from_json(json.loads(json.dumps(config_to_json(config)))) == config
+
+
+def test_the_reward_of_predict_reads_no_likeness():
+    task = PRESETS["predict"].environment
+    weights = DEFAULT_WEIGHTS | task.reward_weights
+    assert task.follows_plan and weights["pose"] == weights["grf"] == weights["step_length"] == 0.0
+    assert [weights[name] / weights["fibre_work"] for name in ("activation", "acceleration")] == [PRICES[1], PRICES[3]]
 
 
 def test_a_configuration_without_a_form_is_not_mirrored():

@@ -54,10 +54,14 @@ def with_person(file, **settings) -> BipedSettings:
     return BipedSettings(**{"action_mode": "residual", "person": file} | settings)
 
 
-def test_the_network_in_the_step_does_what_its_policy_does(file) -> None:
-    policy = person()
-    inside = started(with_person(file))
-    outside = started(BOTH)
+@pytest.mark.parametrize("guide", ["people", "plan"])
+def test_the_network_in_the_step_does_what_its_policy_does(guide, tmp_path) -> None:
+    settings = replace(BOTH, guide=guide)
+    policy = person(settings)
+    file = str(tmp_path / "person.safetensors")
+    save_policy(file, policy)
+    inside = started(with_person(file, guide=guide))
+    outside = started(settings)
     observation = outside.observe()
     for _ in range(50):
         observation[:, PERSON_NAMES.index("own_stiffness")] = 0.0

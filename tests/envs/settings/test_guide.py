@@ -7,10 +7,10 @@ import pytest
 
 from benchmarks.scrambled import scrambled
 from springfoot.envs.batch.biped_batch import Biped
+from springfoot.envs.control import generic_constants
 from springfoot.envs.control.constants import constants_name, leg_constants
 from springfoot.envs.settings.settings import BipedSettings, settings_from
 from springfoot.gait import SpringfootError
-from springfoot.studies.searches.generic_constants import generic_constants
 from springfoot.studies.searches.leg_cost import cost
 
 PLAN = {"guide": "plan"}
@@ -27,13 +27,13 @@ def digest(num=3, steps=100, **settings):
     biped = Biped(settings_from(**PLAN, **settings), num)
     biped.reset(np.arange(num), list(range(num)))
     random = np.random.default_rng(0)
-    seen = [biped.step(random.uniform(-0.3, 0.3, (num, 4))) for _ in range(steps)]
+    seen = [biped.step(random.uniform(-0.3, 0.3, (num, len(biped.action_names)))) for _ in range(steps)]
     return [
         np.stack([getattr(step, name) for step in seen]).tobytes() for name in ("observation", "reward", "terminated")
     ]
 
 
-@pytest.mark.parametrize("more", [{}, {"decisions": "event"}, {"start": "standing"}], ids=str)
+@pytest.mark.parametrize("more", [{}, {"acts": "both"}, {"decisions": "event"}, {"start": "standing"}], ids=str)
 def test_people_scrambled_walk_the_same_bits(noise_file, more):
     assert digest(**more) == digest(**more, people_file=noise_file)
 
@@ -81,6 +81,12 @@ def test_with_the_fixed_schedule_it_walks():
         fallen |= biped.step(np.zeros((4, 4))).terminated
     assert not fallen.any()
     assert biped.measurement.com[:, 0] / 6.0 == pytest.approx(1.2, abs=0.15)
+
+
+def test_learned_legs_begin_at_constants_that_nobody_tuned():
+    tuned = leg_constants("planned", "people", follows_plan=True)
+    for acts, constants in (("stiffness", tuned), ("person", generic_constants()), ("both", generic_constants())):
+        assert Biped(settings_from(**PLAN, acts=acts), 1).constants == (constants,)
 
 
 def test_settings_that_need_people_are_refused():

@@ -1,6 +1,6 @@
-"""Make leg constants that nobody tuned, for searches that must start without knowledge."""
+"""Make leg constants that nobody tuned, at which learned persons that follow the plan begin, and searches."""
 
-from springfoot.envs.control import KNOTS, LegConstants
+from .constants import KNOTS, LegConstants
 
 GENERIC = "generic"
 """Name of these constants as a search's start."""
