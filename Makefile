@@ -36,7 +36,7 @@ help:
 	@echo "make benchmark  springs and our PPO, five seeds, on the tasks that set stiffness, submitted and judged; hours; goes on after a stop"
 	@echo "make install  only $(VENV), from requirements.lock; the others do it by themselves"
 	@echo "make lock     requirements.lock anew: the versions of constraints.txt with the hash of every file"
-	@echo "make predict  a walk from nothing: plan, leg constants, policy; goes on after a stop"
+	@echo "make predict  a walk from nothing: plan, person, evaluation; goes on after a stop"
 	@echo "make answers  the studies of docs/answers.md in build/answers; goes on after a stop; QUICK=1: their shape in a minute"
 	@echo "make clean    remove .venv, builds and caches, never runs/"
 

@@ -6,11 +6,12 @@ from springfoot.lazy import lazy_names
 
 if TYPE_CHECKING:
     from .baselines import CONSTANT_STIFFNESS, PolicyFunction, and_copy, has_feedback, leg_phase, own_settings, schedule
-    from .policy import BEST, RUN, SHIPPED, find_policy
+    from .policy import BEST, LAST, RUN, SHIPPED, find_policy
 
 __all__ = [
     "BEST",
     "CONSTANT_STIFFNESS",
+    "LAST",
     "RUN",
     "SHIPPED",
     "PolicyFunction",
@@ -28,6 +29,7 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
         {
             "BEST": "policy",
             "CONSTANT_STIFFNESS": "baselines",
+            "LAST": "policy",
             "RUN": "policy",
             "SHIPPED": "policy",
             "PolicyFunction": "baselines",

@@ -17,7 +17,11 @@ MADE = {
         "`springfoot train --push-newton 250 --timesteps 500000 --out runs/medium`",
         "walk",
     ),
-    "predicted": ("Walks by a plan that knows no person's curves.", "`springfoot study predict`", "prediction"),
+    "predicted": (
+        "Walks by a plan that knows no person's curves.",
+        "`springfoot study predict`, while that trained a policy of stiffness",
+        "prediction",
+    ),
     **{
         name: (
             "Moves hips, knees and ankles too, on any foot, body, speed, step time and slope that it drew.",

@@ -176,7 +176,8 @@ class BipedSettings:
     people_file: str | None = field(default=None, metadata=_REFERENCE)
     """File of people's data in place of `human_harmonics.json` of `springfoot.gait`, in the same form."""
     plan_file: str | None = field(default=None, metadata=_REFERENCE)
-    """With guide `plan`: file of the plan's style and leg constants (`springfoot study predict`), not the package's."""
+    """With guide `plan`: file of the plan's style (`springfoot study predict`) and of the constants of tuned legs, not
+    the package's."""
     equilibrium: Equilibrium = field(default="planned", metadata=_SPRINGS)
     """Rest angle of ankle and toe: the target's ankle angle with the moment of `feedforward` fed forward (planned),
     that angle alone, constant (neutral), or constant in each phase of `schedule` (phase)."""

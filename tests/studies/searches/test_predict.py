@@ -1,4 +1,4 @@
-"""A walk from nothing by one command: its stages, its table, the file of what it found."""
+"""A walk from nothing by one command: its stages and their seconds, its table, the file of its plan."""
 
 import json
 from dataclasses import asdict
@@ -7,11 +7,13 @@ import cma
 import numpy as np
 import pytest
 
+from springfoot.agents.policies.policy import read_policy
 from springfoot.cli.main import study_main
 from springfoot.envs.control.constants import leg_constants
 from springfoot.envs.settings.settings import BipedSettings, settings_from
 from springfoot.gait import SpringfootError
 from springfoot.gait.plan.walk_style import STYLES
+from springfoot.studies.base.stage_seconds import StageSeconds
 from springfoot.studies.searches.cma_search import generations
 from springfoot.studies.searches.prediction_table import PREDICTION, people_numbers, plan_numbers, prediction_table
 
@@ -19,27 +21,52 @@ from springfoot.studies.searches.prediction_table import PREDICTION, people_numb
 @pytest.mark.slow
 def test_all_stages_run_and_a_second_time_nothing_is_done_again(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    pages, before = [], {}
+    runs = tmp_path / "runs-quick"
+    pages, before, seconds = [], {}, []
     for number in range(2):
         words = ["--quick", "--runs", "runs", "--out", f"out-{number}", "--threads", "1"]
         assert study_main(["predict", *words]) == 0
         report = (tmp_path / f"out-{number}" / "report.md").read_text(encoding="utf-8")
         pages.append(report.split("| stage |")[0])  # behind it seconds
-        kept = {path: path.stat().st_mtime_ns for path in (tmp_path / "runs-quick").rglob("*.json")}
-        kept[tmp_path / "runs-quick" / "found.json"] = (tmp_path / "runs-quick" / "found.json").read_bytes()
+        seconds.append(json.loads((runs / "seconds.json").read_text(encoding="utf-8")))
+        kept = {path: path.stat().st_mtime_ns for path in runs.rglob("*.json")} | {runs / "seconds.json": 0}
+        kept[runs / "styles.json"] = (runs / "styles.json").read_bytes()
         if number:
             assert kept == before
         before = kept
     assert pages[0] == pages[1] and pages[0].count("|") > 100
-    found = json.loads((tmp_path / "runs-quick" / "found.json").read_text(encoding="utf-8"))
-    assert list(found["styles"]) == ["1.2"] and list(found["constants"]) == [
-        "predicted",
-        "predicted, 0.9 m/s",
-        "predicted, 1.5 m/s",
-    ]
+    first, both = seconds
+    assert list(first) == ["plan", "person", "evaluation"] and all(both[stage] > first[stage] for stage in first)
+    assert both["person"] < 1.5 * first["person"]  # it learns once
+    (person,) = runs.glob("person-*/last.safetensors")
+    settings = read_policy(person).settings
+    assert settings.follows_plan and settings.plan_file == "runs-quick/styles.json"
     capsys.readouterr()
     assert study_main(["predict", "--quick", "--runs", "runs", "--search-seed", "1"]) == 2
     assert "is of a search with other settings" in capsys.readouterr().err
+
+
+def test_seconds_of_a_stage_add_up_over_stops(tmp_path):
+    path = tmp_path / "seconds.json"
+
+    def stop():
+        with StageSeconds(path).of("plan") as keep:
+            keep(1)
+            assert json.loads(path.read_text(encoding="utf-8"))["plan"] > 0  # a kill after this keeps it
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        stop()
+    stopped = StageSeconds(path).seconds["plan"]
+    again = StageSeconds(path)
+    with again.of("plan"):
+        pass
+    with again.of("person"):
+        pass
+    assert list(again.seconds) == ["plan", "person"] and again.seconds["plan"] > stopped
+    path.write_text('{"plan": "long"}', encoding="utf-8")
+    with pytest.raises(SpringfootError, match="seconds of 'plan' must be"):
+        StageSeconds(path)
 
 
 def test_a_stopped_search_goes_on_with_the_same_bits(tmp_path):
