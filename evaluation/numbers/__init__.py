@@ -10,7 +10,6 @@ if TYPE_CHECKING:
     from .measured_effort import effort_numbers, mean_effort, stiffness_charge
     from .metrics import MOMENT_CURVES, Gait, measure
     from .per_leg import asymmetry, leg_numbers
-    from .planned_task import effort_and_impact
     from .series import foot_contacts, mean_speed, strides_within
     from .tally import StrideTally, add_episode
 
@@ -27,7 +26,6 @@ __all__ = [
     "StrideTally",
     "add_episode",
     "asymmetry",
-    "effort_and_impact",
     "effort_numbers",
     "foot_contacts",
     "gait_numbers",
@@ -58,7 +56,6 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
             "StrideTally": "tally",
             "add_episode": "tally",
             "asymmetry": "per_leg",
-            "effort_and_impact": "planned_task",
             "foot_contacts": "series",
             "gait_numbers": "likeness",
             "leg_numbers": "per_leg",

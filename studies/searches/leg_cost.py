@@ -10,7 +10,7 @@ vector that the refinement minimises by least squares.
 from collections.abc import Sequence
 from dataclasses import astuple, replace
 from functools import lru_cache
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -23,11 +23,7 @@ from springfoot.evaluation.numbers import LATE_SWING_PERCENT, StrideTally
 from springfoot.evaluation.recording import planned_course
 from springfoot.gait.people import PERCENT, HumanGait, correlation, force_features, stride_work
 
-from .leg_walks import FOREIGN, Walks, foreign_springs, measured, walk
-from .walk_effort import effort_price
-
-Pays = Literal["likeness", "effort"]
-"""Cost of an undisturbed walk: its distance from people or the plan, or its effort."""
+from .leg_walks import FOREIGN, PUSHED_FOREIGN, Walks, measured, walk
 
 SCHEDULED, PUSHED, SET_OFF = 2, 3, 4
 """Walks of each candidate with its schedule: undisturbed, pushed, from standing."""
@@ -112,8 +108,6 @@ def cost(
     push: float,
     ease: float = 0.0,
     foreign: float = 1.0,
-    pays: Pays = "likeness",
-    impact: float = 1.0,
 ) -> NDArray:
     """Return the cost of each candidate, (C,).
 
@@ -125,18 +119,15 @@ def cost(
         push: size of the pushes in the pushed walks [N]; 0 leaves these walks out.
         ease: as in `leg_walks.walk`.
         foreign: factor on the cost of walks with foreign springs.
-        pays: cost of an undisturbed walk.
-        impact: price of impact over that of effort, where walks pay for effort (`walk_effort`).
     """
-    springs, pushed_springs = foreign_springs(settings)
     count = len(candidates)
     settings = replace(settings, unevenness_m=UNEVENNESS)
     total = np.zeros(count)
 
     # Undisturbed: each candidate walks SCHEDULED times with its schedule, then once with each foreign spring.
-    walks = SCHEDULED + len(springs)
+    walks = SCHEDULED + len(FOREIGN)
     seeds = [seed + index % walks for index in range(walks * count)]
-    walked = walk(settings, candidates, seeds, threads, ease, springs)
+    walked = walk(settings, candidates, seeds, threads, ease, FOREIGN)
     missing = walked.missing  # 0 for walks without a fall
     for index in range(walks * count):
         candidate = index // walks
@@ -145,11 +136,12 @@ def cost(
         elif missing[index] > 0:
             total[candidate] += missing[index] * 3 * FALL_COST / SCHEDULED
         else:
-            of_walk = _walk_cost(walked.episode(index), walked.biped, pays, impact)
-            total[candidate] += (FALL_COST if of_walk is None else of_walk) / SCHEDULED
+            tally = measured(walked.episode(index), walked.biped)
+            distance = FALL_COST if tally is None else float(np.linalg.norm(misses(tally, walked.biped)))
+            total[candidate] += distance / SCHEDULED
 
-    # The thesis's constant springs, which only people's guide walks with.
-    if settings.equilibrium == "planned" and not settings.follows_plan:
+    # The thesis's constant springs.
+    if settings.equilibrium == "planned":
         thesis = replace(settings, **own_settings("thesis", settings))
         walked = walk(thesis, candidates, [seed] * count, threads, foreign=())
         total += [foreign * _foreign_cost(walked, index, lost) for index, lost in enumerate(walked.missing)]
@@ -165,23 +157,11 @@ def cost(
 
     # Pushes: only falls count.
     pushed = replace(settings, push_newton=push, push_interval=2.5)
-    walks = PUSHED + len(pushed_springs)
+    walks = PUSHED + len(PUSHED_FOREIGN)
     seeds = [seed + index % walks for index in range(walks * count)]
-    missing = walk(pushed, candidates, seeds, threads, ease, foreign=pushed_springs).missing.reshape(count, walks)
+    missing = walk(pushed, candidates, seeds, threads, ease, foreign=PUSHED_FOREIGN).missing.reshape(count, walks)
     fallen = missing[:, :PUSHED].mean(1) + foreign * FOREIGN_SHARE * missing[:, PUSHED:].sum(1) / len(FOREIGN)
     return total + FALL_COST * fallen
-
-
-def _walk_cost(series: dict[str, NDArray], biped: Biped, pays: Pays, impact: float) -> float | None:
-    """Return the cost of a walk without a fall, by `pays` (`cost`), from its `series`; None if a leg takes fewer than
-    two strides, or if the body does not advance."""
-    tally = measured(series, biped)
-    if tally is None:
-        return None
-    distances = misses(tally, biped)
-    if pays == "likeness":
-        return float(np.linalg.norm(distances))
-    return effort_price(series, tally, biped, distances, impact)
 
 
 def _foreign_cost(walked: Walks, index: int, missing: float) -> float:

@@ -4,8 +4,7 @@
     springfoot study leg-tuning --speed 0.8 --start planned --sigma 0.4 --generations 100
 
 Steps of least squares on the same misses may come first: they bring the walk near its target, and the generations make
-it stand pushes. `leg_cost` computes the cost of a candidate. The result is a fit to people's curves, not a prediction,
-unless the body follows the plan (`--guide plan`) or pays for effort (`--pays effort`).
+it stand pushes. `leg_cost` computes the cost of a candidate. The result is a fit to people's curves, not a prediction.
 """
 
 import json
@@ -29,15 +28,15 @@ from springfoot.envs.control import (
     generic_constants,
     reference_walk_at,
 )
-from springfoot.envs.settings import BipedSettings, Feedforward, Guide
+from springfoot.envs.settings import BipedSettings, Feedforward
 from springfoot.errors import SpringfootError, require_count, require_number
 from springfoot.files.writing import csv_text
-from springfoot.gait.plan import Cadence, least_work
+from springfoot.gait.plan import Cadence
 
 from ..base.study import Answer, OnProgress, Study
 from .cma_search import asked_of, generations
 from .constants_file import CONSTANTS, read_constants, write_constants
-from .leg_cost import REFINED_SECONDS, Pays, all_misses, cost
+from .leg_cost import REFINED_SECONDS, all_misses, cost
 from .leg_vector import Search
 
 DIFFERENCE = 0.08
@@ -65,8 +64,6 @@ class LegTuning(Study):
     """Cadence of the constants."""
     speed: float = TUNED_SPEED
     """Speed of the constants [m/s]."""
-    guide: Guide = "people"
-    """Target of the walk, and of its cost: people, or the plan alone."""
     feedforward: Feedforward = "people"
     """Source of the moments that are fed forward."""
     start: str = ""
@@ -87,18 +84,12 @@ class LegTuning(Study):
     """First generation with pushed walks."""
     foreign: float = 1.0
     """Price of walks with springs that were not tuned for the candidate; 0 leaves them out."""
-    pays: Pays = "likeness"
-    """Cost of an undisturbed walk: its distance from people or the plan, or its effort and impact."""
-    impact: float = 1.0
-    """Price of impact over that of effort, with `--pays effort`."""
     seed: int = 0
     """Seed of the search and of the walks."""
     threads: int = 2
     """Threads of the physics."""
     constants: Annotated[Path, tyro.conf.arg(metavar="FILE")] = CONSTANTS
     """File of constants to read and to write."""
-    plan_file: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = None
-    """With guide plan: file of the plan's style, in place of the package's."""
     people_file: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = None
     """File of people's data, in place of the package's."""
     log: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = None
@@ -108,7 +99,7 @@ class LegTuning(Study):
     UNIT: ClassVar[str] = " steps"
 
     def check(self) -> None:
-        """Refuse numbers out of range, and refinements of a walk that pays for effort: they need misses of a target."""
+        """Refuse numbers out of range."""
         least = {
             "generations": 1,
             "population": 2,
@@ -122,9 +113,6 @@ class LegTuning(Study):
             require_count(count, getattr(self, count), bound)
         require_number("sigma", self.sigma, 0, above=True)
         require_number("foreign", self.foreign, 0)
-        require_number("impact", self.impact, 0)
-        if self.pays == "effort" and self.refinements:
-            raise SpringfootError(f"refinements must be 0 where a walk pays for effort, got {self.refinements}")
 
     @property
     def total(self) -> float:
@@ -142,12 +130,10 @@ class LegTuning(Study):
             cadence=self.cadence,
             speed=self.speed,
             feedforward=self.feedforward,
-            guide=self.guide,
-            plan_file=self.plan_file and str(self.plan_file),
             people_file=self.people_file and str(self.people_file),
             episode_seconds=REFINED_SECONDS + 1,
         )
-        name = constants_name(self.equilibrium, self.cadence, self.speed, self.feedforward, settings.follows_plan)
+        name = constants_name(self.equilibrium, self.cadence, self.speed, self.feedforward)
         known = read_constants(self.constants)["constants"]
         if self.start == GENERIC:
             known = known | {GENERIC: asdict(generic_constants())}
@@ -161,7 +147,7 @@ class LegTuning(Study):
         if self.refinements:
             begin, misses = self._refine(begin, settings, lambda better: self._keep(name, better), progress)
             report = f"misses {misses[0]:.2f} to {misses[-1]:.2f}; then "
-        search = Search(begin, self.speed, target, placing=settings.follows_plan)
+        search = Search(begin, self.speed, target)
         options = {"popsize": self.population, "seed": self.seed + 1, "verbose": -9}
         strategy = cma.CMAEvolutionStrategy(np.zeros(search.size), self.sigma, options)
         lines = []
@@ -172,9 +158,9 @@ class LegTuning(Study):
             candidates = [search.constants(v) for v in vectors]
             push = self.push_newton if generation >= self.pushed_from else 0.0
             seed = self.seed + 1000 * generation
-            return cost(settings, candidates, seed, self.threads, push, ease, self.foreign, self.pays, self.impact)
+            return cost(settings, candidates, seed, self.threads, push, ease, self.foreign)
 
-        asked = asked_of(self) | {"from": asdict(begin), "style": self._style(settings)}
+        asked = asked_of(self) | {"from": asdict(begin)}
         for generation, _, costs in generations(strategy, self.generations, costs_of, self.log, asked):
             lines.append([generation + 1, costs.min(), np.median(costs)])
             progress(1)
@@ -184,10 +170,6 @@ class LegTuning(Study):
         result = search.constants(strategy.mean)
         text = f"{json.dumps({name: asdict(result)})}\n\n{report}{_generation_text(*lines[-1])}"
         return Answer(text=text, files={"generations.csv": csv_text(["generation", "best", "median"], lines)})
-
-    def _style(self, settings: BipedSettings) -> dict[str, Any] | None:
-        """Return the style of the plan that the body follows; None if it follows people."""
-        return least_work(self.speed, self.plan_file).to_json() if settings.follows_plan else None
 
     def _refine(
         self,
@@ -205,7 +187,7 @@ class LegTuning(Study):
         walks scatter too much to rely on a single step.
         """
         target = reference_walk_at(settings, settings.speed, [start]).target
-        search = Search(start, settings.speed, target, placing=settings.follows_plan)
+        search = Search(start, settings.speed, target)
 
         def misses_at(vectors: NDArray) -> list[NDArray | None]:
             """Return the misses at search vectors (V, size), distance from the start appended; None for a fall."""

@@ -15,7 +15,6 @@ ADDITIVE_STEP = {
     "toe_flat_deg": 3.0,
     "trunk_pitch_deg": 1.0,
     "swing_speed_gain": 0.05,
-    "swing_place_gain": 0.2,
     "speed_torque": 15.0,
     "period_speed_gain": 0.03,
 }
@@ -33,18 +32,11 @@ class Search:
     """Vectors of a search, in unit steps from its start, and the leg constants that they stand for.
 
     The last three entries of a vector lead whole target curves (`LED`). `names` (size,) has the constant of each entry.
-    With `placing` there is an entry for `swing_place_gain`, which only bodies that follow their plan use.
+    There is none for `swing_place_gain`, which only bodies that follow their plan use.
     """
 
-    def __init__(
-        self,
-        start: LegConstants,
-        speed: float = TUNED_SPEED,
-        target: HumanGait | None = None,
-        *,
-        placing: bool = False,
-    ):
-        varied = {name: value for name, value in asdict(start).items() if placing or name != "swing_place_gain"}
+    def __init__(self, start: LegConstants, speed: float = TUNED_SPEED, target: HumanGait | None = None):
+        varied = {name: value for name, value in asdict(start).items() if name != "swing_place_gain"}
         self._start = {name: np.atleast_1d(np.array(value, float)) for name, value in varied.items()}
         target = target or human_gait(speed)
         # Change of the knots [deg] that shifts a target curve by one `LEAD_STEP`: the step times the curve's rate.

@@ -40,14 +40,6 @@ FOREIGN, PUSHED_FOREIGN = (UNCHANGING, QUASI, MID_RANGE), (UNCHANGING, QUASI)
 """Foreign springs with which each candidate walks undisturbed, and under pushes."""
 
 
-def foreign_springs(settings: BipedSettings) -> tuple[Sequence[NDArray], Sequence[NDArray]]:
-    """Return the foreign springs of undisturbed and of pushed walks.
-
-    There are none where the body follows its plan: the springs are people's, or were chosen on people's walk.
-    """
-    return ((), ()) if settings.follows_plan else (FOREIGN, PUSHED_FOREIGN)
-
-
 def walk(
     settings: BipedSettings,
     candidates: Sequence[LegConstants],

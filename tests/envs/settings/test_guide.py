@@ -11,7 +11,6 @@ from springfoot.envs.control import generic_constants
 from springfoot.envs.control.constants import constants_name, leg_constants
 from springfoot.envs.settings.settings import BipedSettings, settings_from
 from springfoot.gait import SpringfootError
-from springfoot.studies.searches.leg_cost import cost
 
 PLAN = {"guide": "plan"}
 
@@ -36,18 +35,6 @@ def digest(num=3, steps=100, **settings):
 @pytest.mark.parametrize("more", [{}, {"acts": "both"}, {"decisions": "event"}, {"start": "standing"}], ids=str)
 def test_people_scrambled_walk_the_same_bits(noise_file, more):
     assert digest(**more) == digest(**more, people_file=noise_file)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("pays", ["likeness", "effort"])
-def test_people_scrambled_cost_a_search_the_same(noise_file, pays):
-    candidates = [generic_constants(), leg_constants("planned", "people", follows_plan=True)]
-    costs = [
-        cost(settings_from(**PLAN, people_file=file, episode_seconds=10.0), candidates, 0, 1, 0.0, pays=pays)
-        for file in (None, noise_file)
-    ]
-    assert costs[0].tobytes() == costs[1].tobytes()
-    assert costs[0][1] < costs[0][0]
 
 
 def test_the_plans_moment_stands_beside_the_springs_whatever_their_stiffness():
