@@ -239,7 +239,7 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
     | `schedule`                | `None`          | a stiffness schedule in JSON form                                  |
     | **person**                |                 |                                                                    |
     | `acts`                    | `"stiffness"`   | the action sets `"stiffness"`, the `"person"`, or `"both"`         |
-    | `person`                  | `"tuned"`       | who walks there: `"tuned"`, a person of the package, or a file     |
+    | `person`                  | `None`          | who walks there: the guide's own, `"tuned"`, a person, or a file   |
     | `person_range_deg`        | `14.0`          | largest offset of a rest angle [deg]                               |
     | `aim_rate`                | `0.0`           | how fast a person aims at the speed it lacks [1/s]                 |
     | `stiffness_by`            | `"action"`      | who sets the stiffness where the action moves the person           |

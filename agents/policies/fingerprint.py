@@ -14,6 +14,7 @@ from springfoot.envs.control.equilibrium import foot_curves, foot_feed
 from springfoot.envs.control.legs import PLANNED_PLACE, leg_curves
 from springfoot.envs.control.reference_walk import rows
 from springfoot.envs.control.stiffness_control import stiffness_of
+from springfoot.envs.settings.settings import TUNED
 from springfoot.errors import SpringfootError
 
 _MODEL_NUMBERS = (
@@ -43,8 +44,8 @@ def fingerprint(biped: Biped) -> dict[str, str]:
         of_legs += [*_digested_constants(constants).values(), *(curve[::_EVERY] for curve in curves)]
         if (feed := foot_feed(biped.settings, constants, walk)) is not None:
             of_legs.append(feed[::_EVERY])
-    person = biped.settings.person
-    of_person = {} if person == "tuned" else {"person": digest_of_person(person)}
+    person = biped.settings.walker
+    of_person = {} if person == TUNED else {"person": digest_of_person(person)}
     return of_person | {
         "observation": _digest(biped.observation_names, biped.observation_low, biped.observation_high),
         "action": _digest(biped.action_names, stiffness_of(actions, biped.settings, biped.body)),

@@ -34,7 +34,7 @@ from ..physics.simulation import MjData, MjModel, Simulation
 from ..physics.timing import CONTROL_WINDOW, WINDOWS_PER_ACTION_STEP
 from ..settings.checks import real_numbers
 from ..settings.drawn import OWN_FEET
-from ..settings.settings import BipedSettings, settings_of_bodies
+from ..settings.settings import TUNED, BipedSettings, settings_of_bodies
 from ..task.episode_end import reasons_of
 from ..task.ground import Ground
 from ..task.initial_state import place, random_phase, start_table, walking_posture
@@ -122,7 +122,7 @@ class Biped(ExactState):
             one_way=self._worn.one_way,
             loaded=any(of_body.carried_ratio > 0.0 for of_body in settings_of_bodies(settings)),
         )
-        self._learned = None if settings.person == "tuned" else LearnedPerson(settings.person, settings.guide)
+        self._learned = None if settings.walker == TUNED else LearnedPerson(settings.walker, settings.guide)
         aim_rate = settings.aim_rate if self._learned is None else self._learned.aim_rate
         self._person = PersonActions(settings, self.subjects.rows, aim_rate)
         self._source = StiffnessSource(settings, self.subjects.rows)

@@ -16,7 +16,7 @@ from springfoot.errors import SpringfootError
 from springfoot.files.tensor_file import digest_of_file, read_tensors
 
 from ..physics.model import ACTIONS, MOVED, actions_of
-from ..settings.settings import FARTHEST_OFFSET_DEG, FASTEST_AIM
+from ..settings.settings import FARTHEST_OFFSET_DEG, FASTEST_AIM, TUNED
 from ..task.mirror import mirror_of
 from ..task.observation_entries import PERSON_OBSERVATION
 from .leg_network import LegNetwork
@@ -43,7 +43,7 @@ def person_file(name: str) -> Path:
     """Return the file of a person, one of `LEARNED` or a path; raise `SpringfootError` if there is none."""
     path = PERSONS_FOLDER / f"{LEARNED[name]}.safetensors" if name in LEARNED else Path(name)
     if not path.is_file():
-        known = ", ".join(repr(one) for one in ("tuned", *LEARNED) if one != name)
+        known = ", ".join(repr(one) for one in (TUNED, *LEARNED) if one != name)
         raise SpringfootError(f"person must be one of {known}, or the file of a policy that is one, got {name!r}")
     return path
 

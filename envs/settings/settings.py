@@ -86,6 +86,10 @@ FASTEST_AIM = 5.0
 """Largest setting `aim_rate` [1/s]; chosen: a fifth of a second, a third of a step."""
 TENDON_RANGE = (100.0, 2000.0)
 """Stiffness of a tendon that the setting `ankle_tendon` takes [N m/rad]; chosen: a fourth and five times people's."""
+TUNED = "tuned"
+"""Name of the person who is no network: the rest angles of the leg constants alone."""
+OWN_PERSON: dict[Guide, str] = {"people": TUNED, "plan": TUNED}
+"""Guide -> its own person, who walks where the setting `person` is None."""
 DEFAULT_WEIGHTS = {
     "alive": 0.15,
     "speed": 0.40,
@@ -205,10 +209,10 @@ class BipedSettings:
     acts: Acts = field(default="stiffness", metadata=_PERSON)
     """What the action sets: the stiffness of ankles and toes; the person, that is, offsets to the rest angles of hips,
     knees and ankles, every 20 ms; or both (`springfoot.envs.control.person_actions`)."""
-    person: str = field(default="tuned", metadata=_PERSON)
-    """Who walks where the action sets stiffness alone: the tuned rest angles (tuned); a person of the package, who
-    has learned other feet, bodies and slopes (learned, learned-2 to learned-5); or another one, a policy file of
-    `springfoot train --preset person`."""
+    person: str | None = field(default=None, metadata=_PERSON)
+    """Who walks where the action sets stiffness alone: by default the guide's own, of both guides the tuned rest angles
+    (tuned); a person of the package, who has learned other feet, bodies and slopes (learned, learned-2 to learned-5);
+    or another one who learned on the same guide, a policy file of `springfoot train --preset person`, or `predict`."""
     person_range_deg: float = field(default=14.0, metadata=_PERSON)
     """Largest offset of a rest angle, that of an action of 1 [0..30 deg]."""
     aim_rate: float = field(default=0.0, metadata=_PERSON)
@@ -319,7 +323,13 @@ class BipedSettings:
     @property
     def has_learned_legs(self) -> bool:
         """Return True if a network moves the rest angles of the legs: a learned person, or the policy itself."""
-        return self.acts != "stiffness" or self.person != "tuned"
+        return self.acts != "stiffness" or self.walker != TUNED
+
+    @property
+    def walker(self) -> str:
+        """Return who walks where the action sets stiffness alone: the setting `person`, or the guide's own; `TUNED`
+        where the policy itself moves the legs."""
+        return TUNED if self.acts != "stiffness" else self.person or OWN_PERSON[self.guide]
 
     @property
     def step_seconds(self) -> float:
@@ -360,13 +370,17 @@ class BipedSettings:
         """Raise `SpringfootError` for `person`, `acts`, `stiffness_by` and `decisions` that do not go together."""
         require_number("person_range_deg", self.person_range_deg, 0.0, FARTHEST_OFFSET_DEG, unit="deg")
         require_number("aim_rate", self.aim_rate, 0.0, FASTEST_AIM, unit="1/s")
-        if not isinstance(self.person, str) or not self.person:
-            raise SpringfootError(f"person must be 'tuned' or the name of a policy file, got {quoted(self.person)}")
+        if self.person is not None and (not isinstance(self.person, str) or not self.person):
+            raise SpringfootError(
+                f"person must be None, 'tuned' or the name of a policy file, got {quoted(self.person)}"
+            )
+        if self.person == OWN_PERSON[self.guide]:
+            object.__setattr__(self, "person", None)  # one value for one walk: settings with it are equal
         if self.acts == "stiffness":
             if self.stiffness_by != "action":
                 raise SpringfootError(f"stiffness_by {self.stiffness_by!r} needs acts 'person' or 'both'")
             return
-        if self.person != "tuned":
+        if self.person not in (None, TUNED):
             raise SpringfootError(
                 f"acts {self.acts!r}: the policy itself moves the legs, so that person must be 'tuned'"
             )

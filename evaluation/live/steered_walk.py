@@ -22,7 +22,7 @@ from springfoot.envs.control.stiffness_control import FEET, action_of, stiffness
 from springfoot.envs.physics.model import ACTIONS, SIDES
 from springfoot.envs.physics.simulation import MjData, MjModel
 from springfoot.envs.settings.checks import LONGEST_EPISODE
-from springfoot.envs.settings.settings import BipedSettings, body_of
+from springfoot.envs.settings.settings import TUNED, BipedSettings, body_of
 from springfoot.errors import SpringfootError, require_number
 from springfoot.gait import GRAVITY
 from springfoot.gait.body.body import Body
@@ -190,7 +190,7 @@ class LiveSession:
         """The name of the learned person who walks: of the setting `person`, or the policy that is one; "" for none."""
         if self._settings.acts != "stiffness":
             return self.name
-        return "" if self._settings.person == "tuned" else self._settings.person
+        return "" if self._settings.walker == TUNED else self._settings.walker
 
     @property
     def model(self) -> MjModel:

@@ -13,7 +13,7 @@ from springfoot.envs.physics.contact import contact_offsets
 from springfoot.envs.physics.foot import FootJoint
 from springfoot.envs.physics.model import SIDES
 from springfoot.envs.settings.feet import ENGAGES, KINDS, ORTHOSIS_NUMBERS, SEGMENT_RATIOS, FootSetting
-from springfoot.envs.settings.settings import BipedSettings, body_of
+from springfoot.envs.settings.settings import TUNED, BipedSettings, body_of
 from springfoot.errors import printable
 from springfoot.gait import GRAVITY
 from springfoot.gait.people.gait_events import PERCENT
@@ -169,7 +169,7 @@ def walker_parts(settings: BipedSettings, words_of: Callable[[FootSetting], str]
     )
     left, right = map(words_of or foot_words, (settings.left_foot, settings.right_foot))
     feet = f"both feet {left}" if left == right else f"left foot {left}, right foot {right}"
-    person = [] if settings.person == "tuned" else [f"person {printable(Path(settings.person).stem)}"]
+    person = [] if settings.walker == TUNED else [f"person {printable(Path(settings.walker).stem)}"]
     return [f"{height} m", f"{mass} kg", feet, *person]
 
 

@@ -13,7 +13,7 @@ from rich.table import Table
 
 from springfoot.envs.physics.model import LEFT, RIGHT
 from springfoot.envs.settings.feet import FOOT_SETTINGS
-from springfoot.envs.settings.settings import BipedSettings, body_of, reference_gait, settings_from
+from springfoot.envs.settings.settings import TUNED, BipedSettings, body_of, reference_gait, settings_from
 from springfoot.errors import printable
 from springfoot.files.markdown import MISSING, plus_minus, text_of
 from springfoot.gait import GRAVITY, HumanGait
@@ -99,7 +99,7 @@ def _world_words(metrics: dict[str, Any]) -> str:
     feet that differ."""
     environment = metrics["environment"]
     pushes = f", pushes ±{environment['push_newton']:g} N" if environment["push_newton"] else ""
-    person = "" if environment["person"] == "tuned" else f", person {Path(environment['person']).stem}"
+    person = "" if environment["person"] in (None, TUNED) else f", person {Path(environment['person']).stem}"
     feet = ", ".join(f"{side} {kind}" for side, kind in metrics["feet"].items())
     return (
         f"{environment['height']:g} m, {environment['mass']:g} kg, {environment['speed']:g} m/s, "
@@ -132,7 +132,11 @@ def _all_fell(metrics: dict[str, Any]) -> bool:
 
 def _hint_on_falls(environment: dict[str, Any]) -> str:
     """Return a hint after nothing but falls in an `environment`, the settings in metrics.json."""
-    tuned = environment["acts"] == "stiffness" and environment["person"] == "tuned" and environment["guide"] == "people"
+    tuned = (
+        environment["acts"] == "stiffness"
+        and environment["person"] in (None, TUNED)
+        and environment["guide"] == "people"
+    )
     if tuned and any(environment[foot] != "intact" for foot in FOOT_SETTINGS):
         return "on these feet try --person learned"
     return "springfoot live shows how"

@@ -17,6 +17,7 @@ from springfoot.envs.settings.settings import (
     DRAWN_SETTINGS,
     THEME_OF,
     THEMES,
+    TUNED,
     BipedSettings,
     reference_gait,
     settings_from,
@@ -53,6 +54,17 @@ def test_settings_hold_their_own_copy_of_what_was_given():
     settings = settings_from(reward_weights=weights)
     weights["alive"] = 9.0
     assert settings.reward_weights == {"alive": 0.5}
+
+
+def test_the_guides_own_person_walks_by_default():
+    for guide in ("people", "plan"):
+        settings = BipedSettings(guide=guide)
+        assert settings.person is None and settings.walker == TUNED and not settings.has_learned_legs
+        assert BipedSettings(guide=guide, person=TUNED) == settings
+    learned = BipedSettings(person="learned")
+    assert learned.walker == learned.person == "learned" and learned.has_learned_legs
+    both = BipedSettings(acts="both", person=TUNED)
+    assert both.walker == TUNED and both.has_learned_legs
 
 
 def test_feet_schedule_and_human_are_objects_whether_given_plain_or_as_objects():
@@ -126,6 +138,7 @@ BAD = [
         {"drawn_bodies": [{"step_time_ratio": 0.9}], "cadence": "thesis"},
         ["step_time_ratio needs cadence 'people', got 'thesis'"],
     ),
+    ({"person": ""}, ["person must be None, 'tuned' or the name of a policy file, got ''"]),
     ({"action_mode": "relative"}, ["action_mode", "'absolute'", "'residual'"]),
     ({"decisions": "30hz"}, ["decisions", "'100hz'", "'event'"]),
     ({"stiffness_joints": "knee"}, ["stiffness_joints", "'ankle'", "'toe'"]),
