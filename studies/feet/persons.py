@@ -143,6 +143,8 @@ class Persons(WalkingStudy):
             act, settings = person_and_settings(name, {})
             ranges = replace(
                 _walked(PRESETS["person"].environment),
+                guide=settings.guide,
+                plan_file=settings.plan_file,
                 acts=settings.acts,
                 stiffness_by="action",
                 person_range_deg=settings.person_range_deg,
