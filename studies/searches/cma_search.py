@@ -20,7 +20,19 @@ from springfoot.files.writing import write_atomically
 from ..base.study import Study
 
 WITHOUT_EFFECT = frozenset(
-    {"threads", "quick", "out", "command", "log", "generations", "styles", "constants", "plan_file", "keep"}
+    (
+        "threads",
+        "processes",
+        "quick",
+        "out",
+        "command",
+        "log",
+        "generations",
+        "styles",
+        "constants",
+        "plan_file",
+        "keep",
+    )
 )
 """Flags that do not change the cost of any candidate."""
 

@@ -11,9 +11,15 @@ searches would add their luck to the change with speed.
 """
 
 import json
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass, fields
+from functools import partial
 from itertools import pairwise
+from multiprocessing import get_context
 from pathlib import Path
+from signal import SIG_IGN, SIGINT, signal
 from typing import Annotated, Any, ClassVar, Literal
 
 import cma
@@ -204,6 +210,8 @@ class PlanTuning(Study):
     """File of styles to begin at, in place of round numbers."""
     styles: Annotated[Path, tyro.conf.arg(metavar="FILE")] = STYLES
     """File of styles to write to."""
+    processes: int = 1
+    """Processes that price plans; the results are the same with any number."""
     log: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = None
     """File of the costs of each generation: a search that was stopped goes on from it with the same bits."""
 
@@ -212,7 +220,7 @@ class PlanTuning(Study):
 
     def check(self) -> None:
         """Refuse counts out of range, and speeds that do not ascend."""
-        for count, least in (("generations", 1), ("population", 4), ("seed", 0)):
+        for count, least in (("generations", 1), ("population", 4), ("seed", 0), ("processes", 1)):
             require_count(count, getattr(self, count), least)
         require_number("sigma", self.sigma, 0, above=True)
         for name in ("tissue", "tendon", "toe_tendon"):
@@ -239,6 +247,22 @@ class PlanTuning(Study):
 
     def ask(self, progress: OnProgress) -> Answer:
         """Search, and write the styles."""
+        with self._mapping() as on_each:
+            return self._search(progress, on_each)
+
+    @contextmanager
+    def _mapping(self) -> Iterator[Callable[..., Iterable[float]]]:
+        """Yield `map`, or with several `processes` its equivalent that calls the function in them."""
+        if self.processes == 1:
+            yield map
+            return
+        # They leave Ctrl-C to this process. None is a copy of this one, whose threads a copy would lack.
+        how = {"mp_context": get_context("spawn"), "initializer": signal, "initargs": (SIGINT, SIG_IGN)}
+        with ProcessPoolExecutor(self.processes, **how) as pool:
+            yield pool.map
+
+    def _search(self, progress: OnProgress, on_each: Callable[..., Iterable[float]]) -> Answer:
+        """Search, and write the styles; `on_each` maps a function on candidates."""
         body = Body()
         options = {"popsize": self.population, "seed": self.seed + 1, "verbose": -9}
         begin = np.zeros((len(self.found_speeds), len(CHOICES_OF[self.cadence])))
@@ -252,7 +276,7 @@ class PlanTuning(Study):
 
         def costs_of(_: int, candidates: list[NDArray]) -> NDArray:
             """Return the costs of a generation's candidates."""
-            return np.array([self._mean_price(body, candidate) for candidate in candidates])
+            return np.array(list(on_each(partial(self._mean_price, body), candidates)))
 
         for generation, vectors, costs in generations(strategy, self.generations, costs_of, self.log, asked_of(self)):
             if costs.min() < best_cost:

@@ -1,11 +1,11 @@
-"""Predict a walk from body, plan and physics by one command: a plan, a person who learns to walk it, an evaluation.
+"""Predict a walk from body, plan and physics by one command: plans, a person who learns to walk them, an evaluation.
 
     springfoot study predict
 
 The person begins at leg constants that nobody tuned (`generic_constants`) and with an untrained network. No earlier
-result takes part: the search for the plan starts at round numbers. docs/results/prediction.md lists the knowledge of
-people in it. Each stage keeps its result in the folder `runs`; after a stop the same command goes on, with the bits of
-an uninterrupted one.
+result takes part: the search for the first plan starts at round numbers. docs/results/prediction.md lists the knowledge
+of people in it. Each stage keeps its result in the folder `runs`; after a stop the same command goes on, with the bits
+of an uninterrupted one.
 """
 
 import hashlib
@@ -27,22 +27,29 @@ from ..base.pushed_walks import PushedWalks, kept_metrics
 from ..base.stage_seconds import StageSeconds
 from ..base.study import Answer, OnProgress, WalkingStudy, without_places
 from ..base.trained import finish_training
-from .constants_file import read_styles
+from .constants_file import read_styles, write_constants
 from .plan_tuning import PlanTuning
 from .prediction_table import people_numbers, plan_numbers, prediction_table, walk_numbers
 
 FOUND = "styles.json"
-"""File with the plan's style, a `plan_file` of the settings."""
+"""File with the styles of the plans, a `plan_file` of the settings."""
+PLAN_SPEEDS: dict[float, float | None] = {1.2: None, 1.05: 1.2, 0.9: 1.05, 1.35: 1.2, 1.5: 1.35}
+"""Speed of a plan [m/s] -> the one at whose style its search begins; None: at round numbers. Chosen: with one style for
+all speeds a walk changes with speed otherwise than people's."""
+NEXT_SPREAD = 0.3
+"""First spread of a search that begins at another speed's style, in units of the search; chosen."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Predict(WalkingStudy):
-    """Predict a walk from nothing: a plan of least effort, a person who learns to walk it, numbers."""
+    """Predict a walk from nothing: plans of least effort, a person who learns to walk them, numbers."""
 
     runs: Annotated[Path, tyro.conf.arg(metavar="FOLDER")] = Path("runs/predict")
     """Folder in which each stage keeps its result; the same command goes on there after a stop."""
     plan_generations: int = 300
-    """Generations of the search for the plan of least effort."""
+    """Generations of the search for the plan of least effort at 1.2 m/s."""
+    next_generations: int = 100
+    """Generations of the search at each other speed, which begins at its neighbour's style."""
     population: int = 20
     """Candidates in each generation."""
     timesteps: int = PRESETS["predict"].timesteps
@@ -53,6 +60,7 @@ class Predict(WalkingStudy):
     QUICK: ClassVar[dict[str, Any]] = {
         **WalkingStudy.QUICK,
         "plan_generations": 1,
+        "next_generations": 1,
         "population": 4,
         "timesteps": PRESETS["predict"].update_steps,
     }
@@ -61,15 +69,15 @@ class Predict(WalkingStudy):
     def check(self) -> None:
         """Refuse counts out of range."""
         super().check()
-        for name in ("plan_generations", "timesteps"):
+        for name in ("plan_generations", "next_generations", "timesteps"):
             require_count(name, getattr(self, name))
         require_count("population", self.population, 4)
         require_count("search_seed", self.search_seed, 0, 2**31 - 2)
 
     @property
     def total(self) -> float:
-        """Return the number of generations of the search; the training has a progress of its own."""
-        return self.plan_generations
+        """Return the number of generations of all searches; the training has a progress of its own."""
+        return self.plan_generations + (len(PLAN_SPEEDS) - 1) * self.next_generations
 
     @property
     def folder(self) -> Path:
@@ -85,9 +93,9 @@ class Predict(WalkingStudy):
     def _run_stages(self, progress: OnProgress) -> Answer:
         """Run the stages in order; each goes on from its result in the folder, if there is one."""
         stages = StageSeconds(self.folder / "seconds.json")
-        with stages.of("plan") as keep_seconds:
-            self._plan(lambda generations: [tell(generations) for tell in (keep_seconds, progress)])
-        # The person's folder is named after the plan, so that another plan trains another person.
+        with stages.of("plans") as keep_seconds:
+            self._find_plans(lambda generations: [tell(generations) for tell in (keep_seconds, progress)])
+        # The person's folder is named after the plans, so that others train another person.
         styles = read_styles(self.folder / FOUND)["styles"]
         digest = hashlib.sha256(json.dumps(styles).encode()).hexdigest()
         person = self.folder / f"person-{digest[:8]}"
@@ -101,7 +109,7 @@ class Predict(WalkingStudy):
 
     @property
     def training(self) -> TrainingConfig:
-        """Return the training of the person, which follows the plan that was found."""
+        """Return the training of the person, which follows the plans that were found."""
         preset = PRESETS["predict"]
         return replace(
             preset,
@@ -111,24 +119,40 @@ class Predict(WalkingStudy):
             environment=replace(preset.environment, plan_file=str(self.folder / FOUND)),
         )
 
-    def _plan(self, progress: OnProgress) -> None:
-        """Search for the plan, and write its style and the search's report."""
-        search = PlanTuning(
-            generations=self.plan_generations,
-            population=self.population,
-            seed=self.search_seed,
-            styles=self.folder / FOUND,
-            command=without_places(self.command),
-            log=self.folder / "plan.json",
-        )
-        write_atomically(self.folder / "plan.txt", f"{search.ask(progress).text}\n".encode())
+    def _find_plans(self, progress: OnProgress) -> None:
+        """Search for the plan at each speed, and write its style, the search's report, and all styles in `FOUND`."""
+        found: dict[str, Any] = {"styles": {}, "found_by": {}}
+        for speed, begins_at in PLAN_SPEEDS.items():
+            style = self._style_file(speed)
+            search = PlanTuning(
+                speeds=(speed,),
+                generations=self.plan_generations,
+                population=self.population,
+                seed=self.search_seed,
+                processes=self.threads,
+                styles=style,
+                command=without_places(self.command),
+                log=self.folder / f"plan-{speed:g}.json",
+            )
+            if begins_at is not None:
+                search = replace(
+                    search, generations=self.next_generations, sigma=NEXT_SPREAD, start=self._style_file(begins_at)
+                )
+            write_atomically(self.folder / f"plan-{speed:g}.txt", f"{search.ask(progress).text}\n".encode())
+            for entry, values in found.items():
+                values |= read_styles(style)[entry]
+        write_constants(self.folder / FOUND, found)
+
+    def _style_file(self, speed: float) -> Path:
+        """Return the file with the style at `speed` [m/s]: each search begins at one that no later search changes."""
+        return self.folder / f"style-{speed:g}.json"
 
     def _evaluate(self, person: Path, digest: str) -> str:
         """Walk with the person, undisturbed and pushed, and return the report's text.
 
         Args:
             person: its file.
-            digest: of the plan. Metrics are kept, and measured anew for another plan or length of the training.
+            digest: of the plans. Metrics are kept, and measured anew for other plans or lengths of the training.
         """
         settings = self.training.environment
         walks = PushedWalks(

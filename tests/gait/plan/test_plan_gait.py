@@ -101,6 +101,9 @@ def test_a_search_at_several_speeds_finds_one_style_linear_in_speed(tmp_path):
     styles = tmp_path / "styles.json"
     search = PlanTuning(speeds=(0.9, 1.2, 1.5), generations=2, population=4, sigma=0.02, start=STYLES, styles=styles)
     text = search.ask(lambda _: None).text
+    content = styles.read_bytes()
+    replace(search, processes=2).ask(lambda _: None)
+    assert styles.read_bytes() == content
     slow, middle, fast = (vector_of(least_work(speed, styles)) for speed in search.speeds)
     assert np.abs(fast - slow).max() > 0.01 and middle == pytest.approx(0.5 * (slow + fast), abs=1e-3)
     for speed, vector in zip(search.speeds, (slow, middle, fast), strict=True):

@@ -36,10 +36,12 @@ def test_all_stages_run_and_a_second_time_nothing_is_done_again(tmp_path, monkey
         before = kept
     assert pages[0] == pages[1] and pages[0].count("|") > 100
     first, both = seconds
-    assert list(first) == ["plan", "person", "evaluation"] and all(both[stage] > first[stage] for stage in first)
+    assert list(first) == ["plans", "person", "evaluation"] and all(both[stage] > first[stage] for stage in first)
     assert both["person"] < 1.5 * first["person"]  # it learns once
     (person,) = runs.glob("person-*/last.safetensors")
     settings = read_policy(person).settings
+    styles = json.loads((runs / "styles.json").read_text(encoding="utf-8"))["styles"]
+    assert sorted(styles) == ["0.9", "1.05", "1.2", "1.35", "1.5"] and len({str(one) for one in styles.values()}) == 5
     assert settings.follows_plan and settings.plan_file == "runs-quick/styles.json"
     capsys.readouterr()
     assert study_main(["predict", "--quick", "--runs", "runs", "--search-seed", "1"]) == 2
