@@ -39,6 +39,7 @@ from springfoot.gait.plan.walk_style import STYLES, styles_of
 from springfoot.gait.springs.foot_file import read_foot
 from springfoot.studies.base.flags import read_json
 from springfoot.studies.base.kept import Kept
+from springfoot.studies.base.stage_seconds import StageSeconds
 from springfoot.studies.searches.cma_search import generations
 from springfoot.studies.searches.constants_file import CONSTANTS, read_constants, read_styles
 from springfoot.studies.walks.learning_curves import read_finished
@@ -97,6 +98,7 @@ def readers(folder: Path) -> dict[str, Reader]:
         "styles of a search": Reader(read=_styles, suffix=".json", bases=(STYLES.read_bytes(),)),
         "costs of a search": Reader(read=_search, suffix=".json", bases=(_searched(folder),)),
         "numbers of a study": Reader(read=Kept, suffix=".json", bases=(b'{"[1, \\"a\\"]": {"falls": 0.0}}',)),
+        "seconds of stages": Reader(read=StageSeconds, suffix=".json", bases=(b'{"plans": 12.5, "person": 3.0}',)),
         "submission": Reader(read=_submission(folder), suffix=".json", bases=(_submitted(),)),
         "judgement": Reader(read=_judgement(folder), suffix=".json", bases=(_judged(),)),
         "setting in JSON": Reader(

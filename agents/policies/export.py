@@ -42,9 +42,9 @@ def export_policy(policy: Policy, out: str | Path) -> list[Path]:
         out: new file, ending in .onnx. Beside it appears its contract, OUT.json.
 
     The graph takes the raw observation (N, D) and returns the action (N, A), and what it sets: stiffness (`Scale`),
-    offsets of a person's rest angles (`OFFSETS`), or both. All are float32, the actions within 1e-5 of the policy's
-    own. Raises `SpringfootError`, with nothing written, for another
-    ending, for files that exist, and without the package onnx.
+    offsets of a person's rest angles (`REST_OFFSETS`), or both. All are float32, the actions within 1e-5 of the
+    policy's own. Raises `SpringfootError`, with nothing written, for another ending, for files that exist, and without
+    the package onnx.
     """
     files = planned_files(out)
     contract = json.dumps(contract_of(policy), indent=1, allow_nan=False) + "\n"
@@ -71,7 +71,7 @@ def planned_files(out: str | Path) -> list[Path]:
 
 CONTRACT_VERSION = 2
 """Version of the contract's layout; 1 knew no person."""
-OFFSETS = "rest_angle_offset"
+REST_OFFSETS = "rest_angle_offset"
 """Output of a policy that moves a person: how far the rest angles of hips, knees and ankles are moved [rad]."""
 SCHEDULE_STEP = SAMPLES // 100
 """Samples of a stride between two values of a schedule in the contract: one percent."""
@@ -179,12 +179,12 @@ def _stiffness(scale: Scale | None) -> dict[str, Any]:
 
 
 def _offsets(settings: BipedSettings) -> dict[str, Any]:
-    """Return the contract's entry on `OFFSETS`, by its name; empty for a policy that moves no person."""
+    """Return the contract's entry on `REST_OFFSETS`, by its name; empty for a policy that moves no person."""
     if settings.acts == "stiffness":
         return {}
     farthest = radians(settings.person_range_deg)
     entries = [{"name": name, "low": -farthest, "high": farthest} for name in PERSON_ACTIONS]
-    return {OFFSETS: {"shape": ["N", len(entries)], "unit": "rad", "entries": entries}}
+    return {REST_OFFSETS: {"shape": ["N", len(entries)], "unit": "rad", "entries": entries}}
 
 
 def _schedule(settings: BipedSettings) -> dict[str, Any]:
@@ -216,7 +216,7 @@ OPERATORS = {"tanh": "Tanh", "relu": "Relu", "leaky_relu": "LeakyRelu", "elu": "
 
 def onnx_bytes(policy: Policy, contract: str) -> bytes:
     """Return the content of the ONNX file: input `observation` (N, D), outputs `action` (N, A), and by its name that of
-    the `Scale`, then `OFFSETS`, where the policy has them.
+    the `Scale`, then `REST_OFFSETS`, where the policy has them.
 
     The graph computes `Policy.__call__` in float32, then what its actions set. The metadata holds `contract`.
     """
@@ -282,8 +282,8 @@ def onnx_bytes(policy: Policy, contract: str) -> bytes:
     if policy.settings.acts != "stiffness":
         farthest = constant(radians(policy.settings.person_range_deg))
         offsets = range(policy.action_count - len(PERSON_ACTIONS), policy.action_count)
-        node("Mul", farthest, actions_at(offsets), name=OFFSETS)
-        outputs.append(float_rows(OFFSETS, len(PERSON_ACTIONS)))
+        node("Mul", farthest, actions_at(offsets), name=REST_OFFSETS)
+        outputs.append(float_rows(REST_OFFSETS, len(PERSON_ACTIONS)))
     graph = helper.make_graph(nodes, "springfoot", inputs, outputs, constants)
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=IR_VERSION)
     model.producer_name = "springfoot"

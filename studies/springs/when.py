@@ -45,7 +45,7 @@ FALL_COST = 4.0
 """Cost of a search if every episode falls, in the aim's unit; chosen: as much as the number itself."""
 HELD_SPEED = 0.1
 """Difference from the commanded speed that costs as much as all falls, by its square [m/s]; chosen."""
-LATE = (2, 4)
+REFLEX_DELAYS = (2, 4)
 """Steps of 20 ms by which a reflex is late; chosen: 40 and 80 ms."""
 NO_WALK = 3 * FALL_COST
 """Cost of a stiffness with which no stride could be measured."""
@@ -126,7 +126,7 @@ class When(WalkingStudy):
         """Return the simulated time of all walks if none falls [s]."""
         links = len(self._classes) - 1
         searched = (1 + 2 * links) * (self.generations * self.population + 2 * CHOOSING)
-        tested = (2 * links + len(LATE)) * len(self._conditions) * self.episodes
+        tested = (2 * links + len(REFLEX_DELAYS)) * len(self._conditions) * self.episodes
         return len(self.aims) * (searched + tested) * self.seconds
 
     def ask(self, progress: OnProgress) -> Answer:
@@ -144,7 +144,7 @@ class When(WalkingStudy):
             found.append((aim, outer, best[aim]))
             links += self._links(kept, aim, (inner, outer), (went_on, best[aim]), progress)
         *_, reflex = self._classes
-        for steps, aim in product(LATE, self.aims):
+        for steps, aim in product(REFLEX_DELAYS, self.aims):
             late = replace(reflex, name=f"{1000 * steps * ACTION_STEP:.0f} ms late", late=steps)
             links += self._links(kept, aim, (reflex, late), (best[aim], best[aim]), progress)
         files = {
