@@ -6,7 +6,7 @@ gains may be 0, so that each class has every stiffness of the class before it, t
 """
 
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil
 
 import numpy as np
@@ -114,12 +114,12 @@ def nested_classes(settings: BipedSettings) -> tuple[StiffnessClass, ...]:
     phase = np.linspace(0.0, gait.toe_off, 1001)
     ankle = _distinct_phases(ankle_events(phase, gait.mean("ankle", phase), gait.toe_off))
     toe = _distinct_phases(toe_events(phase, gait.mean("toe", phase), gait.toe_off))
-    finer = {"ankle": _subdivided_starts(ankle), "toe": _subdivided_starts(toe)}
+    open_loop = StiffnessClass(name="open loop", ankle=_subdivided_starts(ankle), toe=_subdivided_starts(toe))
     return (
         StiffnessClass(name="constant"),
         StiffnessClass(name="per phase", ankle=ankle, toe=toe),
-        StiffnessClass(name="open loop", **finer),
-        StiffnessClass(name="linear reflex", **finer, gains=ankle),
+        open_loop,
+        replace(open_loop, name="linear reflex", gains=ankle),
     )
 
 
