@@ -101,7 +101,8 @@ def _person_entries() -> str:
     """Return the table of the entries that only a person observes."""
     entries = enumerate(PERSON_OBSERVATION[len(OBSERVATION) :], len(OBSERVATION))
     rows = [(str(n), one.name, one.unit, f"{one.low:g}", f"{one.high:g}", one.meaning) for n, one in entries]
-    return table(["Num", "Observation", "Divided by", "Min", "Max", "Meaning"], rows)
+    words = "300 and 60 N m/rad are of 1.70 m and 63 kg, and scale with mass x height."
+    return f"{table(['Num', 'Observation', 'Divided by', 'Min', 'Max', 'Meaning'], rows)}\n\n{words}"
 
 
 def policies() -> str:

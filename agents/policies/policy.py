@@ -142,7 +142,7 @@ class Policy:
         if self._legs is not None:
             bodies = np.atleast_2d(rows).astype(np.float32)
             left, right = np.moveaxis(self._legs(bodies, np.ones(len(bodies), bool)), 1, 0)
-            return self.mirror.both_legs(left, right).reshape(*rows.shape[:-1], -1)
+            return self.mirror.both_legs(left, right).reshape(*rows.shape[:-1], self.action_count)
         return self.mirror.both_legs(self._output_of(rows), self._output_of(self.mirror.of(rows)))
 
     @cached_property

@@ -266,9 +266,11 @@ class PlanTuning(Study):
         body = Body()
         options = {"popsize": self.population, "seed": self.seed + 1, "verbose": -9}
         begin = np.zeros((len(self.found_speeds), len(CHOICES_OF[self.cadence])))
+        asked = asked_of(self)
         if self.start is not None:
             styles = [least_work(speed, self.start) for speed in self.found_speeds]
             begin = np.stack([vector_of(style, self.cadence) for style in styles])
+            asked["start"] = begin.tolist()  # of the file its content counts, which may change, not its place
         strategy = cma.CMAEvolutionStrategy(begin.ravel(), self.sigma, options)
         lines = []
         best_cost = np.inf
@@ -278,7 +280,7 @@ class PlanTuning(Study):
             """Return the costs of a generation's candidates."""
             return np.array(list(on_each(partial(self._mean_price, body), candidates)))
 
-        for generation, vectors, costs in generations(strategy, self.generations, costs_of, self.log, asked_of(self)):
+        for generation, vectors, costs in generations(strategy, self.generations, costs_of, self.log, asked):
             if costs.min() < best_cost:
                 best_cost = float(costs.min())
                 best = vectors[int(np.argmin(costs))]

@@ -83,6 +83,7 @@ def test_a_row_does_not_depend_on_the_others(form, request, observations):
         parts = [policy(observations[k : k + size]) for k in range(0, len(observations), size)]
         assert np.array_equal(np.concatenate(parts), whole)
     assert np.array_equal(policy(observations[5]), whole[5])
+    assert policy(observations[:0]).shape == (0, 4)
 
 
 def test_a_mirrored_policy_is_the_left_legs_network_on_both_images(mirrored, observations):

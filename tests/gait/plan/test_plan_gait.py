@@ -97,6 +97,22 @@ def test_the_search_runs_and_leaves_the_file_alone_with_quick(tmp_path, capsys):
 
 
 @pytest.mark.slow
+def test_kept_costs_belong_to_the_content_of_the_start_not_to_its_place(tmp_path):
+    start = tmp_path / "start.json"
+    start.write_bytes(STYLES.read_bytes())
+    search = PlanTuning(
+        generations=1, population=4, start=start, styles=tmp_path / "found.json", log=tmp_path / "log.json"
+    )
+    search.ask(lambda _: None)
+    found = (tmp_path / "found.json").read_bytes()
+    replace(search, start=STYLES).ask(lambda _: None)  # the same content elsewhere
+    assert (tmp_path / "found.json").read_bytes() == found
+    start.write_bytes(found)
+    with pytest.raises(SpringfootError, match="is of a search with other settings"):
+        search.ask(lambda _: None)
+
+
+@pytest.mark.slow
 def test_a_search_at_several_speeds_finds_one_style_linear_in_speed(tmp_path):
     styles = tmp_path / "styles.json"
     search = PlanTuning(speeds=(0.9, 1.2, 1.5), generations=2, population=4, sigma=0.02, start=STYLES, styles=styles)
