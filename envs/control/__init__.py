@@ -6,11 +6,13 @@ from springfoot.lazy import lazy_names
 
 if TYPE_CHECKING:
     from .constants import (
+        GENERIC,
         KNOTS,
         TUNED_SPEED,
         LegConstants,
         constants_from,
         constants_name,
+        generic_constants,
         leg_constants,
     )
     from .equilibrium import PLATEAUS, REFERENCE_STIFFNESS, TOE_OFF, foot_curves, plateau_curve
@@ -19,7 +21,6 @@ if TYPE_CHECKING:
     from .standing import SLOW_SPEED
     from .stiffness_control import FEET, action_of, stiffness_of, stiffness_ranges
     from .subjects import DRAWN, Subjects
-    from .untuned_legs import GENERIC, generic_constants
 
 __all__ = [
     "DRAWN",
@@ -55,7 +56,7 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
             "DRAWN": "subjects",
             "FED": "reference_walk",
             "FEET": "stiffness_control",
-            "GENERIC": "untuned_legs",
+            "GENERIC": "constants",
             "GRID": "phase_table",
             "KNOTS": "constants",
             "PLATEAUS": "equilibrium",
@@ -69,7 +70,7 @@ if not TYPE_CHECKING:  # a type checker would take it to mean that any name exis
             "constants_from": "constants",
             "constants_name": "constants",
             "foot_curves": "equilibrium",
-            "generic_constants": "untuned_legs",
+            "generic_constants": "constants",
             "leg_constants": "constants",
             "plateau_curve": "equilibrium",
             "reference_walk_at": "reference_walk",

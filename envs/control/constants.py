@@ -30,6 +30,9 @@ LEAST_STIFFNESS: dict[str, float] = {
 }
 """Lower bounds of constants [N m/rad]."""
 
+GENERIC = "generic"
+"""Name of constants that nobody tuned (`generic_constants`), as a search's start."""
+
 Constants = TypeVar("Constants", "LegConstants", "SlopeConstants")
 
 
@@ -236,3 +239,33 @@ def _package_constants() -> dict[str, dict]:
 def _file() -> dict[str, dict]:
     """Return the content of the package's file of constants, `legs.json`; cached: do not change it."""
     return json.loads(resources.files("springfoot.envs.control").joinpath("legs.json").read_text(encoding="utf-8"))
+
+
+def generic_constants() -> LegConstants:
+    """Return leg constants without tuning, at which searches begin, and learned persons that follow the plan.
+
+    No curve is corrected, all moments are fed forward, springs are equally stiff at every phase, and the trunk is
+    upright.
+    """
+    uncorrected = (0.0,) * len(KNOTS)
+    stance_and_swing = (200.0, 200.0)
+    return LegConstants(
+        hip_knots_deg=uncorrected,
+        knee_knots_deg=uncorrected,
+        ankle_knots_deg=uncorrected,
+        hip_stiffness=stance_and_swing,
+        knee_stiffness=stance_and_swing,
+        feedforward=(1.0, 1.0, 1.0),
+        period_factor=1.0,
+        period_speed_gain=0.0,
+        trunk_pitch_deg=0.0,
+        trunk_stiffness=200.0,
+        trunk_damping=20.0,
+        speed_torque=0.0,
+        trunk_rise=0.05,
+        swing_speed_gain=0.0,
+        neutral_deg=(0.0, 0.0),
+        toe_flat_deg=0.0,
+        ankle_schedule=(200.0, 200.0, 200.0, 200.0, 200.0),
+        toe_schedule=30.0,
+    )

@@ -24,10 +24,9 @@ from springfoot.gait.plan.plan_gait import gait_of
 from springfoot.gait.plan.walk_style import least_work
 
 from ..settings.settings import BipedSettings, body_of, plan_file_of, reference_gait
-from .constants import LegConstants, leg_constants
+from .constants import LegConstants, generic_constants, leg_constants
 from .phase_table import GRID
 from .standing import SLOW_SPEED
-from .untuned_legs import generic_constants
 
 SPACING = 0.1
 """Distance of tabulated speeds [m/s at 1.70 m, scaled with the square root of height]; chosen: half-way between them
