@@ -9,6 +9,7 @@ are `Body`'s. All arrays share their leading axes, written "..." below.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import accumulate
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -145,11 +146,11 @@ def spin_rate(body: Body, motion: LegMotion, centre: NDArray) -> NDArray:
 
     `centre` is the CoM of the whole body, so that its own acceleration does not count in the sum over all parts.
     """
-    joints = list(joint_positions(body, motion.turn, motion.hip).values())
+    _, coms, accelerations = _chain(body, motion)
+    moments = _cross(coms - centre, accelerations)
     rate = np.zeros(motion.hip.shape[:-1])
     for index, (mass, inertia) in enumerate(_masses_and_inertias(body)):
-        com, acceleration = _com(body, motion, joints, index)
-        rate = rate + mass * _cross(com - centre, acceleration) + inertia * motion.acceleration[..., index]
+        rate = rate + mass * moments[index] + inertia * motion.acceleration[..., index]
     return rate
 
 
@@ -194,7 +195,7 @@ def inverse_dynamics(body: Body, motion: LegMotion, load: FootLoad, slope: float
     forces on it, and the moment is I times the turn's acceleration less the other moments about the CoM, that of F
     included (Winter 2009, section 5.1).
     """
-    joints = list(joint_positions(body, motion.turn, motion.hip).values())
+    joints, coms, accelerations = _chain(body, motion)
     # Loads at the upper joint of the segment below; nothing hangs on the toe.
     force = np.zeros(motion.hip.shape)
     turning = np.zeros(motion.hip.shape[:-1])
@@ -202,11 +203,11 @@ def inverse_dynamics(body: Body, motion: LegMotion, load: FootLoad, slope: float
     forces = {}
     for index in reversed(range(len(LEG_SEGMENTS))):
         mass, inertia = _masses_and_inertias(body)[index]
-        com, acceleration = _com(body, motion, joints, index)
+        com = coms[index]
         # Newton, and Euler about the segment's CoM, less the ground's push and the loads at the joint below. Of these
         # `force_below` is on the segment below: its reaction, on this one, is negative.
         force_below = force
-        force = mass * (acceleration - gravity(slope)) + force_below
+        force = mass * (accelerations[index] - gravity(slope)) + force_below
         turning = inertia * motion.acceleration[..., index] + turning
         if index >= FOOT_SEGMENT:  # the ground pushes on foot and toe alone
             push = load.force[..., index - FOOT_SEGMENT, :]
@@ -256,20 +257,35 @@ def _masses_and_inertias(body: Body) -> tuple[tuple[float, float], ...]:
     )
 
 
-def _com(body: Body, motion: LegMotion, joints: list[NDArray], index: int) -> tuple[NDArray, NDArray]:
-    """Return the CoM (..., 2) [m] of segment `index` and its acceleration (..., 2) [m/s^2].
-
-    `joints` are the positions (..., 2) [m] of `JOINTS`.
-    """
+def _chain(body: Body, motion: LegMotion) -> tuple[NDArray, NDArray, NDArray]:
+    """Return of each segment, (4, ..., 2), its upper joint and its CoM [m], and the acceleration of its CoM [m/s^2]."""
+    # Segments and coordinates in front, so that the values of each lie together in memory.
+    turn, acceleration, hip, hip_acceleration = (
+        np.ascontiguousarray(np.moveaxis(values, -1, 0))
+        for values in (motion.turn, motion.acceleration, motion.hip, motion.hip_acceleration)
+    )
+    squared_rate = np.moveaxis(motion.rate, -1, 0) ** 2
+    cosine = np.cos(turn)
+    sine = np.sin(turn)
     forward, below = body.foot_com
     com_from_joint = (0.0, -body.thigh_com), (0.0, -body.shank_com), (forward, -below), (body.toe_com, 0.0)
-    com = joints[index] + np.stack(turned(motion.turn[..., index], *com_from_joint[index]), -1)
+    # Vectors (forward, up) from each segment's upper joint: of the first three to the joint below, of all to the CoM.
+    ahead, up = np.array([*_far_ends(body), *com_from_joint]).T.reshape(2, -1, *[1] * (turn.ndim - 1))
+    segment = [*range(TOE_SEGMENT), *range(len(LEG_SEGMENTS))]
+    cosine, sine = cosine[segment], sine[segment]
+    vector = np.stack([ahead * cosine - up * sine, ahead * sine + up * cosine], 1)
+    # Each joint hangs on the joint above it.
+    joints = np.stack(list(accumulate(vector[:TOE_SEGMENT], initial=hip)))
+    coms = joints + vector[TOE_SEGMENT:]
+    offset = np.concatenate([joints[1:] - joints[:-1], coms - joints])
     # From the hip down, each segment adds its tangential acceleration, along its offset turned by a quarter, and its
-    # centripetal one. The last offset is from the joint above segment `index` to the segment's CoM.
-    acceleration = motion.hip_acceleration
-    for segment, (start, end) in enumerate(zip(joints[: index + 1], [*joints[1 : index + 1], com], strict=True)):
-        offset = end - start
-        quarter_turned = np.stack([-offset[..., 1], offset[..., 0]], -1)
-        acceleration = acceleration + motion.acceleration[..., segment, None] * quarter_turned
-        acceleration = acceleration - motion.rate[..., segment, None] ** 2 * offset
-    return com, acceleration
+    # centripetal one. The last offset is from the segment's upper joint to its CoM.
+    tangential = acceleration[segment][:, None] * np.stack([-offset[:, 1], offset[:, 0]], 1)
+    centripetal = squared_rate[segment][:, None] * offset
+    of_joint = np.empty_like(joints)
+    of_joint[0] = hip_acceleration
+    for index in range(TOE_SEGMENT):
+        of_joint[index + 1] = of_joint[index] + tangential[index] - centripetal[index]
+    of_com = of_joint + tangential[TOE_SEGMENT:] - centripetal[TOE_SEGMENT:]
+    joints, coms, of_com = (np.moveaxis(values, 1, -1) for values in (joints, coms, of_com))
+    return joints, coms, of_com

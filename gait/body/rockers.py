@@ -1,7 +1,7 @@
 """Turn a foot over the ground: pitches that rise with time, and the path of the ankle of a turning foot."""
 
 import numpy as np
-from numpy.polynomial import Polynomial
+from numpy.polynomial.polynomial import polyder, polyval
 from numpy.typing import ArrayLike
 
 from springfoot.arrays import NDArray
@@ -11,7 +11,9 @@ from .body import Body
 
 def turned(pitch: ArrayLike, forward: float, up: float) -> tuple[NDArray, NDArray]:
     """Return x and z (...) of a flat foot's vector (forward, up) turned by `pitch` (...) [rad], toes up positive."""
-    return forward * np.cos(pitch) - up * np.sin(pitch), forward * np.sin(pitch) + up * np.cos(pitch)
+    cosine = np.cos(pitch)
+    sine = np.sin(pitch)
+    return forward * cosine - up * sine, forward * sine + up * cosine
 
 
 def pitch_rise(top: float, phase: ArrayLike, start: float, end: float, shape: float | tuple[float, float]) -> NDArray:
@@ -28,8 +30,8 @@ def pitch_rise(top: float, phase: ArrayLike, start: float, end: float, shape: fl
         # the rate 2 a + 3 b + 4 c = end_rate at the end.
         a = 16 * half_way - 5 + end_rate
         b = 14 - 32 * half_way - 3 * end_rate
-        curve = Polynomial([0.0, 0.0, a, b, 1 - a - b])
-        return top * np.stack([curve.deriv(n)(progress) / duration**n for n in range(3)])
+        coefficients = [0.0, 0.0, a, b, 1 - a - b]
+        return top * np.stack([polyval(progress, polyder(coefficients, n)) / duration**n for n in range(3)])
     power = shape
     # top * progress^power and its derivatives.
     rate = top * power / duration * progress ** (power - 1)

@@ -1,5 +1,7 @@
 """Differentiate a periodic curve by its Fourier series."""
 
+from functools import lru_cache
+
 import numpy as np
 
 from springfoot.arrays import NDArray
@@ -14,10 +16,25 @@ def fourier_jet(samples: NDArray, harmonics: int, phase: NDArray, period: float)
 
     `samples` (n, columns) are evenly spaced over one `period` [s]. The curve is their Fourier series up to `harmonics`.
     """
-    count = len(samples)
-    weight = np.fft.rfft(samples, axis=0)[: harmonics + 1] / count
+    weight = np.fft.rfft(samples, axis=0)[: harmonics + 1] / len(samples)
     weight[1:] *= 2  # each term stands for its negative frequency too, the mean for itself
+    values = np.real(_waves(phase.tobytes(), harmonics, period) @ weight)
+    return list(values.reshape(3, *phase.shape, -1))
+
+
+@lru_cache(maxsize=8)
+def _waves(phases: bytes, harmonics: int, period: float) -> NDArray:
+    """Return the terms (3 N, harmonics + 1) of a Fourier series, then their first and second time derivatives.
+
+    `phases` (N,) are float64 in bytes. Cached, as a plan is differentiated a dozen times.
+    """
     # Each time derivative multiplies a term by its angular frequency.
     turn = 2j * np.pi * np.arange(harmonics + 1)
-    wave = np.exp(phase[..., None] * turn)
-    return [np.real((wave * (turn / period) ** derivative) @ weight) for derivative in range(3)]
+    wave = _wave(phases, harmonics)
+    return np.concatenate([wave * (turn / period) ** derivative for derivative in range(3)])
+
+
+@lru_cache(maxsize=8)
+def _wave(phases: bytes, harmonics: int) -> NDArray:
+    """Return the terms (N, harmonics + 1) of a Fourier series at the `phases` of `_waves`; cached."""
+    return np.exp(np.frombuffer(phases)[:, None] * (2j * np.pi * np.arange(harmonics + 1)))

@@ -5,14 +5,15 @@ leans with the ground, x along it and z at right angles to it, so that gravity h
 sin a) / (z'' + g cos a).
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import pairwise
-from math import pi, sqrt
+from math import comb, pi, sqrt
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
-from scipy.interpolate import BPoly, PPoly
+from scipy.interpolate import PPoly
 
 from springfoot.arrays import NDArray
 
@@ -91,7 +92,7 @@ class Bob:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ComMotion:
-    """Motion of a CoM that repeats every step, one step length further on; made by `periodic_com`.
+    """Motion of a CoM that repeats every step, one step length further on; made by `periodic_com` or `pivoted_com`.
 
     Times [s] are within a step.
     """
@@ -138,30 +139,20 @@ def periodic_com(
     height: float,
     bob: Bob,
     slope: float = 0.0,
-    ahead: PPoly | None = None,
 ) -> ComMotion:
     """Compute the only periodic CoM motion over a ZMP that repeats every step.
 
     The ZMP p [m] runs straight between `zmp_points` at strictly ascending `zmp_times` [s] (first 0, last the step
     time T). The height is z = height + bob(t) [m]. Solves x'' = (g cos a + z'') / z (x - p) - g sin a, a the `slope`
     [rad], with x(T) = x(0) + step_length and x'(T) = x'(0): in closed form where `bob.amplitude` is 0, else with an
-    error below 1e-9 m. With `ahead` [m] over time [s] (`ComMotion`) x + ahead replaces x on the right-hand side.
+    error below 1e-9 m.
     """
-    if ahead is not None:
-        path = _path_by_matrices(zmp_times, zmp_points, step_length, height, bob, slope, ahead)
-    elif bob.amplitude == 0:
+    if bob.amplitude == 0:
         lines = PPoly(np.stack([np.diff(zmp_points) / np.diff(zmp_times), zmp_points[:-1]]), zmp_times)
         path = closed_form(lines, step_length, height, slope)
     else:
         path = _path_by_integration(zmp_times, zmp_points, step_length, height, bob, slope)
-    return ComMotion(
-        step_time=float(zmp_times[-1]),
-        height=height,
-        bob=bob,
-        slope=slope,
-        path=path,
-        ahead=ahead,
-    )
+    return ComMotion(step_time=float(zmp_times[-1]), height=height, bob=bob, slope=slope, path=path)
 
 
 def closed_form(zmp: PPoly, step_length: float, height: float, slope: float = 0.0) -> HyperbolicPath:
@@ -210,7 +201,7 @@ def _path_by_integration(
     bob: Bob,
     slope: float,
 ) -> PPoly:
-    """Return the path of `periodic_com` without a pivot, by numerical integration.
+    """Return the path of `periodic_com` by numerical integration.
 
     The equation is linear: the path is the sum of one particular and two homogeneous solutions that is periodic.
     """
@@ -265,22 +256,18 @@ def _quintics(t: NDArray, x: NDArray, v: NDArray, a: NDArray) -> PPoly:
     third = a[:-1] / 20 * duration**2 - first + 2 * second
     fifth = -v[1:] / 5 * duration + last
     fourth = a[1:] / 20 * duration**2 + 2 * fifth - last
-    return PPoly.from_bernstein_basis(BPoly(np.stack([first, second, third, fourth, fifth, last]), t))
+    return PPoly.construct_fast(_bernstein_to_powers(duration)([first, second, third, fourth, fifth, last]), t)
 
 
-def _path_by_matrices(
-    zmp_times: NDArray,
-    zmp_points: NDArray,
-    step_length: float,
-    height: float,
-    bob: Bob,
-    slope: float,
-    ahead: PPoly,
-) -> PPoly:
-    """Return the path of `periodic_com` with a pivot `ahead` of the CoM, by the method of Runge and Kutta.
+def pivoted_com(
+    zmp_times: NDArray, zmp_points: NDArray, step_length: float, bob: Bob, slope: float = 0.0
+) -> Callable[[float, PPoly], ComMotion]:
+    """Return the function (height, ahead) -> CoM motion of `periodic_com`, with a pivot `ahead` of the CoM.
 
-    The equation is linear, so each of about `STEP_SAMPLES` intervals in a step of the walk is a matrix on (x, x', 1).
-    The product of these matrices gives the periodic start.
+    `ahead` [m] is a function of the time [s] (`ComMotion`): x + ahead replaces x on the right-hand side of the
+    equation. What depends on neither argument is computed once. The equation is linear, so each of about
+    `STEP_SAMPLES` intervals in a step of the walk is a matrix on (x, x', 1), by the method of Runge and Kutta. The
+    product of these matrices gives the periodic start.
     """
     step_time = zmp_times[-1]
     back, down = -gravity(slope)  # g sin a along and g cos a across a slope a
@@ -289,42 +276,74 @@ def _path_by_matrices(
         for start, end in pairwise(zmp_times)
     ]
     t = np.append(np.concatenate(pieces), step_time)
-
-    def equation(time: NDArray) -> NDArray:
-        """Return the matrices A (times, 3, 3) of d/dt (x, x', 1) = A (x, x', 1).
-
-        They are those of x'' = (down + z'') / z (x + ahead - p) - back, with the ZMP p.
-        """
-        z = height + bob(time)
-        squared_rate = (down + bob(time, 2)) / z
-        matrix = np.zeros((len(time), 3, 3))
-        matrix[:, 0, 1] = 1.0
-        matrix[:, 1, 0] = squared_rate
-        matrix[:, 1, 2] = squared_rate * (ahead(time) - np.interp(time, zmp_times, zmp_points)) - back
-        return matrix
-
-    matrices = equation(t)
-    tick = np.diff(t)[:, None, None]
-    unit = np.eye(3)
-    middle = equation(0.5 * (t[1:] + t[:-1]))
-    # The classical Runge-Kutta method, for all steps at once: each `rate` is the matrix of one of its four slopes.
-    rate_start = matrices[:-1]
-    rate_middle = middle @ (unit + tick / 2 * rate_start)
-    rate_middle_again = middle @ (unit + tick / 2 * rate_middle)
-    rate_end = matrices[1:] @ (unit + tick * rate_middle_again)
-    step_matrices = unit + tick / 6 * (rate_start + 2 * rate_middle + 2 * rate_middle_again + rate_end)
-    products = [unit]
-    for step in step_matrices:
-        products.append(step @ products[-1])
-    whole_step = products[-1][:2]  # rows of x and x'; the third stays 1
-    # Solve x(T) = x(0) + step_length, x'(T) = x'(0) for the start (x, x').
-    start = np.linalg.solve(whole_step[:, :2] - np.eye(2), np.array([step_length, 0.0]) - whole_step[:, 2])
-    state = np.stack(products) @ np.append(start, 1.0)
-    x = state[:, 0]
-    v = state[:, 1]
-    a = (matrices @ state[..., None])[:, 1, 0]
+    times = np.concatenate([t, 0.5 * (t[1:] + t[:-1])])  # ends, then middles of the intervals
+    bob_height = bob(times)
+    fall = down + bob(times, 2)
+    zmp_at = np.interp(times, zmp_times, zmp_points)
     duration = np.diff(t)
-    # Quintics by position, velocity and acceleration at their ends, as Bernstein coefficients.
-    bernstein = [x[:-1], x[:-1] + duration * v[:-1] / 5, x[:-1] + 2 * duration * v[:-1] / 5 + duration**2 * a[:-1] / 20]
-    bernstein += [x[1:] - 2 * duration * v[1:] / 5 + duration**2 * a[1:] / 20, x[1:] - duration * v[1:] / 5, x[1:]]
-    return PPoly.from_bernstein_basis(BPoly(np.stack(bernstein), t))
+    tick = duration[:, None, None]
+    to_powers = _bernstein_to_powers(duration)
+    unit = np.eye(3)
+
+    def motion_at(height: float, ahead: PPoly) -> ComMotion:
+        """Compute the CoM motion at a mean `height` [m] with a pivot `ahead` of the CoM [m]."""
+        # The matrices A (times, 3, 3) of d/dt (x, x', 1) = A (x, x', 1), with the ZMP p:
+        # x'' = (down + z'') / z (x + ahead - p) - back.
+        squared_rate = fall / (height + bob_height)
+        matrices = np.zeros((len(times), 3, 3))
+        matrices[:, 0, 1] = 1.0
+        matrices[:, 1, 0] = squared_rate
+        matrices[:, 1, 2] = squared_rate * (ahead(times) - zmp_at) - back
+        ends = matrices[: len(t)]
+        middle = matrices[len(t) :]
+        # The classical Runge-Kutta method, for all steps at once: each `rate` is the matrix of one of its four slopes.
+        rate_start = ends[:-1]
+        rate_middle = middle @ (unit + tick / 2 * rate_start)
+        rate_middle_again = middle @ (unit + tick / 2 * rate_middle)
+        rate_end = ends[1:] @ (unit + tick * rate_middle_again)
+        step_matrices = unit + tick / 6 * (rate_start + 2 * rate_middle + 2 * rate_middle_again + rate_end)
+        products = [unit]
+        for step in step_matrices:
+            products.append(step.dot(products[-1]))
+        whole_step = products[-1][:2]  # rows of x and x'; the third stays 1
+        # Solve x(T) = x(0) + step_length, x'(T) = x'(0) for the start (x, x').
+        start = np.linalg.solve(whole_step[:, :2] - np.eye(2), np.array([step_length, 0.0]) - whole_step[:, 2])
+        state = np.concatenate(products).reshape(-1, 3, 3) @ np.append(start, 1.0)
+        x = state[:, 0]
+        v = state[:, 1]
+        a = (ends @ state[..., None])[:, 1, 0]
+        # Quintics by position, velocity and acceleration at their ends, as Bernstein coefficients.
+        first, last = x[:-1], x[1:]
+        second = first + duration * v[:-1] / 5
+        third = first + 2 * duration * v[:-1] / 5 + duration**2 * a[:-1] / 20
+        fourth = last - 2 * duration * v[1:] / 5 + duration**2 * a[1:] / 20
+        fifth = last - duration * v[1:] / 5
+        path = PPoly.construct_fast(to_powers([first, second, third, fourth, fifth, last]), t)
+        return ComMotion(step_time=float(step_time), height=height, bob=bob, slope=slope, path=path, ahead=ahead)
+
+    return motion_at
+
+
+def _bernstein_to_powers(duration: NDArray) -> Callable[[list[NDArray]], NDArray]:
+    """Return the function from Bernstein coefficients of quintics, (pieces,) each, to those of powers (6, pieces).
+
+    The powers are of the time since a piece began, highest first; `duration` (pieces,) [s] is that of each piece. The
+    bits are those of `PPoly.from_bernstein_basis`, which takes fifteen times as long.
+    """
+    order = 5
+    signs = (-1.0) ** np.arange(order + 1)[:, None]
+    divisors = np.stack([duration**power for power in range(order + 1)])
+    # Coefficient i adds these to powers i and above, before the division by the power of the duration.
+    weights = [
+        np.array([comb(order - i, power - i) for power in range(i, order + 1)])[:, None] * signs[i:]
+        for i in range(order + 1)
+    ]
+
+    def to_powers(bernstein: list[NDArray]) -> NDArray:
+        """Return the coefficients (6, pieces) of powers."""
+        powers = np.zeros_like(divisors)  # lowest first
+        for i, coefficient in enumerate(bernstein):
+            powers[i:] += signs[i] * comb(order, i) * coefficient * weights[i] / divisors[i:]
+        return powers[::-1].copy()
+
+    return to_powers

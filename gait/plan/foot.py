@@ -59,7 +59,7 @@ class FootPath:
 
     def pitch(self, stride_phase: ArrayLike) -> NDArray:
         """Return the foot's pitch to the ground [rad], toes up positive, 0 from foot flat to heel-off."""
-        return self._pose(stride_phase)[2]
+        return self.pose(stride_phase)[2]
 
     def toe_pitch(self, stride_phase: ArrayLike) -> NDArray:
         """Return the toe's pitch to the ground [rad] from foot flat to toe-off: 0, then negative as the toe rolls
@@ -68,14 +68,18 @@ class FootPath:
 
     def ankle(self, stride_phase: ArrayLike) -> tuple[NDArray, NDArray]:
         """Return the ankle axis (x, z) [m]."""
-        x, z, _ = self._pose(stride_phase)
+        x, z, _ = self.pose(stride_phase)
         return x, z
 
     def toe_joint(self, stride_phase: ArrayLike) -> tuple[NDArray, NDArray]:
         """Return the toe joint (x, z) [m]; exactly at its standing place from foot flat until the toe rolls over its
         tip."""
+        return self._toe_joint_of(stride_phase, self.pose(stride_phase))
+
+    def _toe_joint_of(self, stride_phase: ArrayLike, pose: NDArray) -> tuple[NDArray, NDArray]:
+        """Return the toe joint (x, z) [m] of the foot's `pose` at these phases."""
         phase = np.mod(np.asarray(stride_phase, float), 1.0)
-        x, z, pitch = self._pose(phase)
+        x, z, pitch = pose
         forward, up = turned(pitch, self.body.ankle_to_toe_joint, -self._ankle_above_toe_joint)
         planted = (phase >= self.foot_flat) & (phase <= self.tip_off)
         return (
@@ -86,7 +90,11 @@ class FootPath:
     def heel(self, stride_phase: ArrayLike) -> tuple[NDArray, NDArray]:
         """Return the lowest point of the heel (x, z) [m]: the back of the sole, or a point of a round heel; on the
         floor until heel-off."""
-        x, z, pitch = self._pose(stride_phase)
+        return self._heel_of(self.pose(stride_phase))
+
+    def _heel_of(self, pose: NDArray) -> tuple[NDArray, NDArray]:
+        """Return the lowest point of the heel (x, z) [m] of the foot's `pose`."""
+        x, z, pitch = pose
         back, down = turned(pitch, self.flat_heel, self._heel_radius - self.body.ankle_height)
         return x + back, z + down - self._heel_radius
 
@@ -132,7 +140,7 @@ class FootPath:
         """
         phase = np.mod(np.asarray(stride_phase, float), 1.0)
         joint = self.body.ankle_to_toe_joint
-        _, _, pitch = self._heel_rocker(np.minimum(phase, self.foot_flat))[0]  # without its derivatives
+        pitch = self._heel_pitch(np.minimum(phase, self.foot_flat))[0]  # without its derivatives
         # A round heel touches farther back by its radius times the pitch.
         heel = self.flat_heel - self._heel_radius * pitch
         tip = joint + self.body.toe_length
@@ -145,14 +153,22 @@ class FootPath:
         `part` is its first and last time as fractions of the swing.
         """
         phase = self.toe_off + np.linspace(*part, 200) * (1 - self.toe_off)
-        return np.stack([self.ball_clearance(phase), self.heel(phase)[1]])
+        pose = self.pose(phase)
+        _, ball = self._toe_joint_of(phase, pose)
+        _, heel = self._heel_of(pose)
+        return np.stack([ball - self.body.toe_joint_height, heel])
+
+    @cached_property
+    def lowest_swing(self) -> float:
+        """Return the least height [m] of ball and heel above the floor in all but the ends of swing, which touch it."""
+        return float(self.swing_heights((0.005, 0.995)).min())
 
     @property
     def _ankle_above_toe_joint(self) -> float:
         """Return the height of the ankle over the toe joint in a flat foot [m]."""
         return self.body.ankle_height - self.body.toe_joint_height
 
-    def _pose(self, stride_phase: ArrayLike) -> NDArray:
+    def pose(self, stride_phase: ArrayLike) -> NDArray:
         """Return x, z [m] of the ankle and pitch [rad] of the foot at any phases of the stride, (3, ...)."""
         phase = np.mod(np.asarray(stride_phase, float), 1.0)
         # Each part of the path at all phases, held at its ends, and without its derivatives.
@@ -166,15 +182,19 @@ class FootPath:
 
         The result is (derivative, coordinate, ...), (3, 3, ...).
         """
+        jet = ankle_about_pivot(self._heel_pitch(phase), (self.flat_heel, self._heel_radius), self.body)
+        # A round heel rolls along the floor as the pitch falls: x of the ankle, by radius times pitch.
+        jet[:, 0] -= self._heel_radius * jet[:, 2]
+        return jet
+
+    def _heel_pitch(self, phase: ArrayLike) -> NDArray:
+        """Return the pitch [rad] while the foot turns about its heel, and two phase derivatives, (3, ...)."""
         remaining = 1 - np.asarray(phase) / self.foot_flat
         power = HEEL_ROCKER_POWER
         pitch = self.heel_strike_pitch * remaining**power
         rate = -self.heel_strike_pitch * power / self.foot_flat * remaining ** (power - 1)
         curvature = self.heel_strike_pitch * power * (power - 1) / self.foot_flat**2 * remaining ** (power - 2)
-        jet = ankle_about_pivot(np.stack([pitch, rate, curvature]), (self.flat_heel, self._heel_radius), self.body)
-        # A round heel rolls along the floor as the pitch falls: x of the ankle, by radius times pitch.
-        jet[:, 0] -= self._heel_radius * jet[:, 2]
-        return jet
+        return np.stack([pitch, rate, curvature])
 
     def _toe_rocker(self, phase: ArrayLike) -> NDArray:
         """Return ankle x, z [m] and pitch [rad] while the foot turns about its toe joint, and two phase derivatives.
@@ -303,7 +323,7 @@ def refuse_swing_in_ground(feet: FootPath) -> None:
     The tip of the toe is not checked: early in swing the toe bends back to people's posture, which at 1.2 m/s would
     take its tip 20 mm into the floor; a sprung toe gives way.
     """
-    lowest = float(feet.swing_heights((0.005, 0.995)).min())  # at the very ends of swing the foot is on the floor
+    lowest = feet.lowest_swing
     if lowest < -FLOOR_TOLERANCE:
         raise SpringfootError(
             f"swing foot {-lowest:.3f} m in the ground, {-lowest - FLOOR_TOLERANCE:.4f} m more than allowed: "

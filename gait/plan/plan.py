@@ -14,14 +14,14 @@ from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.interpolate import PchipInterpolator, PPoly
+from scipy.interpolate import PchipInterpolator
 
 from springfoot.arrays import NDArray
 from springfoot.errors import SpringfootError, require_within
 
 from ..body.body import ANGLES, GRAVITY, HEIGHT_RANGE, REFERENCE_HEIGHT, Body
 from ..people.human import HumanGait, human_gait
-from .cart_table import Bob, ComMotion, periodic_com
+from .cart_table import Bob, ComMotion, periodic_com, pivoted_com
 from .com_plan import PEOPLES_SHARE, PEOPLES_ZMP, ComPlan, Point
 from .foot import FootPath, feet_under_zmp, refuse_swing_in_ground
 from .foot_style import between
@@ -206,22 +206,16 @@ def plan_walk(
         lowest_at=double_support * (0.5 if style is None else style.lowest),
         second=(0.0, 0.0) if style is None else style.rise_again,
     )
-    # Postures of the last search, the only entry; a search with a pivot (a point `ahead` of the CoM through which the
-    # ground force passes) begins from them.
-    last_legs: list[LegPostures] = []
-
-    def legs_at(height: float, ahead: PPoly | None = None) -> tuple[ComMotion, LegPostures]:
-        """Plan CoM and legs at a mean CoM height [m], with a pivot `ahead` of the CoM [m] if given."""
-        motion = periodic_com(zmp_times, zmp_points, step_length, height, bob, slope, ahead)
-        near = last_legs[0] if last_legs and ahead is not None else None
-        legs = legs_under_com(body, motion, feet, human, near, lean)
-        last_legs[:] = [legs]
-        return motion, legs
-
     if style is not None:
-        still = PPoly(np.zeros((1, 1)), np.array([0.0, step_time]))
-        motion, legs = spinning_legs(body, legs_at, still, step_length, style.knee, com_height, lean)
+        com_at = pivoted_com(zmp_times, zmp_points, step_length, bob, slope)
+        motion, legs = spinning_legs(body, com_at, feet, human, step_time, style.knee, com_height, lean)
     else:
+
+        def legs_at(height: float) -> tuple[ComMotion, LegPostures]:
+            """Plan CoM and legs at a mean CoM height [m]."""
+            motion = periodic_com(zmp_times, zmp_points, step_length, height, bob, slope)
+            return motion, legs_under_com(body, motion, feet, human)
+
         motion, legs = highest_legs(body, legs_at) if com_height is None else legs_at(com_height)
     refuse_impossible_legs(body, legs)
     table = np.stack([legs.thigh, legs.knee, legs.ankle, legs.toe], -1)

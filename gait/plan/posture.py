@@ -14,11 +14,13 @@ from springfoot.errors import SpringfootError
 from ..body.body import Body
 from ..body.rockers import turned
 from ..people.human import HumanGait
-from .cart_table import ComMotion
+from .cart_table import Bob, ComMotion
 from .foot import FootPath
 
 POSTURE_SAMPLES = 600
 """Samples of a stride; chosen."""
+STRIDE_PHASES = np.arange(POSTURE_SAMPLES) / POSTURE_SAMPLES
+"""Phases of these samples."""
 STRAIGHTEST_KNEE = 0.06
 """Least knee flexion of the stride [rad], which sets the height of the CoM; chosen: people's is 0.085 at 1.2 m/s."""
 LOWEST_HIP = 0.12
@@ -39,8 +41,10 @@ def leg_angles(
     """
     square = np.square(forward) + np.square(down)
     # The knee by the law of cosines; the flexed knee puts the thigh ahead of the line from hip to ankle, by `lead`.
-    cosine = (square - thigh_length**2 - shank_length**2) / (2 * thigh_length * shank_length)
-    knee = np.arccos(np.clip(cosine, -1.0, 1.0))
+    cosine = square - thigh_length**2
+    cosine -= shank_length**2
+    cosine /= 2 * thigh_length * shank_length
+    knee = np.arccos(np.minimum(np.maximum(cosine, -1.0), 1.0))  # `np.clip` takes several times as long
     lead = np.arctan2(shank_length * np.sin(knee), thigh_length + shank_length * np.cos(knee))
     return np.arctan2(forward, down) + lead, knee
 
@@ -77,95 +81,91 @@ def legs_under_com(
     `near`; None: at a hip a tenth of the leg's length below the CoM. Positions are in the frame of the ground; trunk
     and thigh angles are to the true vertical, on slopes too.
     """
-    phase = np.arange(POSTURE_SAMPLES) / POSTURE_SAMPLES
-    x, z = motion.position(np.mod(2 * phase, 1.0) * motion.step_time)
-    # The foot's frame stays for the whole stride, the CoM's frame moves on with each step.
-    com = np.stack([x + feet.step_length * (phase >= 0.5), z])
-    ankle, pitch, toe = _feet_over_stride(feet, human)
+    com = com_over_stride(motion) + np.outer([feet.step_length, 0.0], STRIDE_PHASES >= 0.5)
+    ankle, pitch, toe, foot_and_toe = _feet_over_stride(feet, human)
+    # First guess: the hip is a tenth of the leg's length below the CoM.
+    hip = com - np.array([[0.0], [0.1 * body.leg_length]]) if near is None else near.hip.T
+    upright = motion.slope + lean
+    # Shift of the body's CoM from the hip by trunk and load [m].
+    trunk = hypot(*body.upper_moment) / body.total_mass * np.array([[sin(upright)], [cos(upright)]])
+    thigh_length = body.thigh_length
+    shank_length = body.shank_length
+    shank_com = body.shank_com
+    shank_mass = body.shank_mass
+    of_thigh = body.thigh_mass * body.thigh_com / thigh_length
+    of_foot = body.foot_mass + body.toe_mass
+    total_mass = body.total_mass
+    turns = np.empty((2, POSTURE_SAMPLES))  # of thigh and shank
+    directions = np.empty((2, *turns.shape))  # x and z of each
+    to_ankle, knee_joint, leg, part = np.empty((4, *turns.shape))
     half = POSTURE_SAMPLES // 2
-    return legs_under(
-        body,
-        com,
-        ankle,
-        pitch,
-        toe,
-        lambda leg: leg + np.roll(leg, half, axis=-1),  # the other leg is half a stride later
-        motion.slope,
-        None if near is None else near.hip.T,
-        lean,
+    com = com.reshape(2, 2, half)  # coordinate, half of the stride, phase
+    # Fixed point: place the legs below the hip, then move the hip so that the CoM is right. A shift of the hip moves
+    # the legs' masses, which shift the hip by a third as much the next time: the search converges quickly.
+    for _ in range(60):  # some 25 are enough
+        np.subtract(ankle, hip, out=to_ankle)
+        thigh, knee = leg_angles(to_ankle[0], -to_ankle[1], thigh_length, shank_length)
+        turns[0] = thigh
+        np.subtract(thigh, knee, out=turns[1])
+        np.sin(turns, out=directions[0])
+        np.negative(np.cos(turns, out=directions[1]), out=directions[1])
+        # First mass moment of one leg about the hip [kg m]: thigh, shank, foot with toe; in place, for arrays of
+        # this size half of the time goes into new memory.
+        np.multiply(thigh_length, directions[:, 0], out=knee_joint)
+        np.multiply(of_thigh, knee_joint, out=leg)
+        np.multiply(shank_com, directions[:, 1], out=part)
+        part += knee_joint
+        part *= shank_mass
+        leg += part
+        leg += np.multiply(of_foot, to_ankle, out=part)
+        leg += foot_and_toe
+        # The other leg is half a stride later, so that the CoM is at the same place from the hip in both halves.
+        com_from_hip = leg[:, :half] + leg[:, half:]
+        com_from_hip /= total_mass
+        com_from_hip += trunk
+        before = hip
+        hip = (com - com_from_hip[:, None]).reshape(before.shape)
+        np.subtract(hip, before, out=part)
+        if np.abs(part, out=part).max() < 1e-12:
+            break
+    return LegPostures(
+        hip=hip.T,
+        thigh=thigh + motion.slope,
+        knee=knee,
+        ankle=pitch - thigh + knee,
+        toe=toe,
+        reach=np.hypot(*to_ankle),
     )
 
 
 @lru_cache(maxsize=2)
-def _feet_over_stride(feet: FootPath, human: HumanGait) -> tuple[NDArray, NDArray, NDArray]:
-    """Return ankle (x, z) (2, samples) [m], foot pitch and toe angle (samples,) [rad] over the stride.
+def com_over_stride(motion: ComMotion) -> NDArray:
+    """Return the CoM (x, z) (2, samples) [m] at `STRIDE_PHASES`, in the frame of each step; cached."""
+    return np.stack([motion.path(_step_times(motion.step_time)), motion.height + _bob_over_stride(motion.bob)])
+
+
+@lru_cache(maxsize=2)
+def _bob_over_stride(bob: Bob) -> NDArray:
+    """Return the rise and fall of the CoM (samples,) [m] at `STRIDE_PHASES`; cached."""
+    return bob(_step_times(bob.step_time))
+
+
+def _step_times(step_time: float) -> NDArray:
+    """Return the time in a step (samples,) [s] at `STRIDE_PHASES`."""
+    return np.mod(2 * STRIDE_PHASES, 1.0) * step_time
+
+
+@lru_cache(maxsize=2)
+def _feet_over_stride(feet: FootPath, human: HumanGait) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+    """Return ankle (x, z) (2, samples) [m], foot pitch and toe angle (samples,) [rad] over the stride, and the first
+    mass moment (x, z) (2, samples) [kg m] of foot and toe about the ankle.
 
     Cached: one plan needs the same arrays a dozen times.
     """
-    phase = np.arange(POSTURE_SAMPLES) / POSTURE_SAMPLES
-    return np.stack(feet.ankle(phase)), feet.pitch(phase), toe_angle(feet, human, phase)
-
-
-def legs_under(
-    body: Body,
-    com: NDArray,
-    ankle: NDArray,
-    pitch: NDArray,
-    toe: NDArray,
-    sum_over_legs: Callable[[NDArray], NDArray],
-    slope: float = 0.0,
-    near: NDArray | None = None,
-    lean: float = 0.0,
-) -> LegPostures:
-    """Find the hip, and so the legs, that put the whole-body CoM at `com`, over given ankles and feet.
-
-    Args:
-        body: lengths and masses.
-        com: (2, ...) CoM (x, z) [m].
-        ankle: (2, ...) ankle (x, z) [m]. `ankle`, `pitch` and `toe` may have an axis of legs where `com` has length 1.
-        pitch: (...) pitch of the foot [rad].
-        toe: (...) angle of the toe [rad].
-        sum_over_legs: adds up a leg's values (2, ...) over both legs, in the shape of `com`.
-        slope: of the ground [rad].
-        near: (2, ...) hip (x, z) at which the search starts [m].
-        lean: pitch of the trunk off the posture with its CoM, and that of a load, upright over the hip [rad].
-
-    The hip of the result is (..., 2).
-    """
-    foot_and_toe = _foot_moment(body, pitch, toe)
-    # First guess: the hip is a tenth of the leg's length below the CoM.
-    hip = com - np.array([0.0, 0.1 * body.leg_length])[:, *[None] * (com.ndim - 1)] if near is None else near
-    trunk = hypot(*body.upper_moment) / body.total_mass  # shift of the body's CoM from the hip by trunk and load [m]
-    # Fixed point: place the legs below the hip, then move the hip so that the CoM is right. A shift of the hip moves
-    # the legs' masses, which shift the hip by a third as much the next time: the search converges quickly.
-    for _ in range(60):  # some 25 are enough
-        forward = ankle[0] - hip[0]
-        down = hip[1] - ankle[1]
-        thigh, knee = leg_angles(forward, down, body.thigh_length, body.shank_length)
-        knee_joint = body.thigh_length * np.stack([np.sin(thigh), -np.cos(thigh)])
-        shank = np.stack([np.sin(thigh - knee), -np.cos(thigh - knee)])
-        # first mass moment of one leg about the hip [kg m]
-        leg = (
-            body.thigh_mass * body.thigh_com / body.thigh_length * knee_joint
-            + body.shank_mass * (knee_joint + body.shank_com * shank)
-            + (body.foot_mass + body.toe_mass) * np.stack([forward, -down])
-            + foot_and_toe
-        )
-        com_from_hip = sum_over_legs(leg) / body.total_mass
-        com_from_hip[0] += trunk * sin(slope + lean)
-        com_from_hip[1] += trunk * cos(slope + lean)
-        hip_change = np.abs(com - com_from_hip - hip).max()
-        hip = com - com_from_hip
-        if hip_change < 1e-12:
-            break
-    return LegPostures(
-        hip=np.moveaxis(hip, 0, -1),
-        thigh=np.asarray(thigh + slope),
-        knee=knee,
-        ankle=pitch - thigh + knee,
-        toe=toe,
-        reach=np.hypot(forward, down),
-    )
+    pose = feet.pose(STRIDE_PHASES)
+    pitch = pose[2]
+    toe = toe_angle(feet, human, STRIDE_PHASES)
+    return pose[:2], pitch, toe, _foot_moment(feet.body, pitch, toe)
 
 
 def _foot_moment(body: Body, pitch: NDArray, toe: NDArray) -> NDArray:
@@ -186,15 +186,16 @@ def toe_angle(feet: FootPath, human: HumanGait, phase: NDArray) -> NDArray:
     style_angle = feet.style.toe_swing
     at_toe_off = human.mean("toe", feet.toe_off) if style_angle is None else style_angle
     in_air = human.mean("toe", phase) if style_angle is None else np.full(phase.shape, style_angle)
-    landing = in_air * feet.pitch(phase) / feet.heel_strike_pitch
-    rolling = feet.toe_pitch(phase) - feet.pitch(phase)
+    pitch = feet.pitch(phase)
+    landing = in_air * pitch / feet.heel_strike_pitch
+    rolling = feet.toe_pitch(phase) - pitch
     # The bend at toe-off fades within the first third of swing.
     remaining = np.clip(1 - 3 * (phase - feet.toe_off) / (1 - feet.toe_off), 0.0, 1.0)
     swinging = in_air + remaining**2 * (feet.toe_off_pitch - feet.roll_pitch - at_toe_off)
     # Early in swing people's angle would take the tip into the floor: bend the toe up until its tip is at floor level.
     lifted = feet.ball_clearance(phase) + feet.body.toe_joint_height * (1 - cos(feet.roll_pitch))
     level = np.arcsin(np.clip(lifted / feet.body.toe_length, 0.0, 1.0))
-    swinging = np.maximum(swinging, -feet.pitch(phase) - level)
+    swinging = np.maximum(swinging, -pitch - level)
     return np.select(
         [phase < feet.foot_flat, phase <= feet.heel_off, phase <= feet.toe_off], [landing, 0.0, rolling], swinging
     )

@@ -168,8 +168,9 @@ def price(
         effort = effort_of(plan, muscle)
     except SpringfootError:
         return IMPOSSIBLE + PER_UNIT * outside + float(np.linalg.norm(vector)), None, None
-    lowest = float(plan.feet.swing_heights((0.005, 0.995)).min())  # all but the ends of swing, which touch the ground
-    too_low = max(0.0, LOWEST_SOLE - lowest) + max(0.0, LEAST_CLEARANCE * body.length_scale - plan.feet.clearance)
+    too_low = max(0.0, LOWEST_SOLE - plan.feet.lowest_swing) + max(
+        0.0, LEAST_CLEARANCE * body.length_scale - plan.feet.clearance
+    )
     cost = (
         float(np.dot(weights, effort.terms))
         + PER_METRE_LOW * too_low
