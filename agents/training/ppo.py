@@ -6,6 +6,7 @@ PPO: proximal policy optimisation (Schulman et al. 2017, arXiv 1707.06347). The 
 
 import warnings
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,13 @@ from .mirrored_network import MirroredMeanStd, MirroredNetwork
 POLICY_SAMPLES = 1_000_000.0
 """Samples that the statistics of a policy's observations stand for where training begins with it; its file does not
 say; chosen."""
+
+
+def _learning_rate(config: TrainingConfig, left: float) -> float:
+    """Return the learning rate when the fraction `left` of a training is still to come; its last update may end beyond
+    it, with a negative one."""
+    left = max(left, 0.0)
+    return config.learning_rate * (left + config.learning_rate_end * (1 - left))
 
 
 class _CriticFirstPPO(PPO):
@@ -84,8 +92,7 @@ class Learner:
             self.ppo = _CriticFirstPPO(
                 MirroredNetwork if config.mirrored else "MlpPolicy",
                 self.normalized,
-                # left: fraction of the training that is still to come, 1 at its start
-                learning_rate=lambda left: config.learning_rate * (left + config.learning_rate_end * (1 - left)),
+                learning_rate=partial(_learning_rate, config),
                 n_steps=self.rollout_steps,
                 batch_size=-(-samples // config.minibatches),  # rounded up
                 n_epochs=config.epochs,

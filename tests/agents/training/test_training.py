@@ -138,6 +138,13 @@ def test_exported_policy_acts_as_the_network_does(learner):
         assert policy(learner.normalized.get_original_obs()) == pytest.approx(expected, abs=1e-5)
 
 
+def test_the_learning_rate_falls_to_its_end_and_stays_there(learner):
+    rate = learner.ppo.lr_schedule
+    assert rate(1.0) == SHORT.learning_rate
+    assert rate(0.0) == pytest.approx(SHORT.learning_rate * SHORT.learning_rate_end)
+    assert rate(-3.0) == rate(0.0)  # of one update that is longer than the training
+
+
 def test_state_is_all_there_is_to_a_learner(learner):
     learner.ppo.learn(1024)
     other = Learner(SHORT, learner.normalized.venv, seed=1)
