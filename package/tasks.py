@@ -72,8 +72,8 @@ TASKS = _tasks()
 FINGERPRINTS = {
     "Walk-v0": 2265.59,
     "Pushed-v0": 2137.7,
-    "AnyBody-v0": 2272.88,
-    "Slopes-v0": 2198.89,
+    "AnyBody-v0": 2274.47,
+    "Slopes-v0": 2198.88,
     "WeakCalf-v0": 1978.69,
     "Prosthesis-v0": 2005.57,
     "FromThePlan-v0": 135.11,

@@ -371,6 +371,7 @@ class Biped(ExactState):
 
     def _before_step(self, step: "_Step") -> None:
         """Let bodies set off or stop, change speeds, push, set the stiffness and begin the first window."""
+        seen = self._seen_by_person()  # as by a policy, before commands change
         if self._standing is not None:
             time = self._steps * self.dt
             step.walking, step.on_schedule = self._standing.switch(self._simulation.arrays, time, step.running)
@@ -379,7 +380,7 @@ class Biped(ExactState):
         if self.settings.push_newton:
             self._simulation.push(self._pushes.force(self._steps, self._random, step.running))
         if step.of_person is not None or self._learned is not None:
-            self._move_person(step, 0)
+            self._move_person(step, 0, seen)
         begin_step(
             self.subjects.rows,
             self._simulation.arrays.bodies,
@@ -392,17 +393,22 @@ class Biped(ExactState):
             step.on_schedule,
         )
 
-    def _move_person(self, step: "_Step", window: int) -> None:
+    def _seen_by_person(self) -> NDArray | None:
+        """Return the observation (N, D) of a learned person, without noise; None if none walks."""
+        if self._learned is None:
+            return None
+        return self._task.observe(self._simulation.arrays.bodies, len(PERSON_OBSERVATION))
+
+    def _move_person(self, step: "_Step", window: int, seen: NDArray | None) -> None:
         """Move the rest angles of hips, knees and ankles before control window number `window` of the step: by the
-        action at the step's beginning, or by a learned person every 20 ms."""
+        action at the step's beginning, or by a learned person every 20 ms, who has `seen` an observation."""
         resting = step.running & ~step.walking
         if step.of_person is not None:
             self._person.move(self._person.offsets(step.of_person), step.walking, resting)
-        elif self._learned is not None:
+        elif self._learned is not None and seen is not None:
             windows = self._steps * self.windows_per_step + window  # since the episode began
             moving = step.walking & (windows % WINDOWS_PER_ACTION_STEP == 0)
-            observation = self._task.observe(self._simulation.arrays.bodies, len(PERSON_OBSERVATION))
-            self._person.move(self._learned.offsets(observation, moving), moving, resting)
+            self._person.move(self._learned.offsets(seen, moving), moving, resting)
 
     def _simulate(self, step: "_Step") -> None:
         """Run the physics of one control window with the control that the springs, the legs and the stance set."""
@@ -432,7 +438,7 @@ class Biped(ExactState):
             end_window(controls, self._physics, self._forces, window, step.walking)
             self._after_window(step)
             if person_acts:
-                self._move_person(step, window + 1)
+                self._move_person(step, window + 1, self._seen_by_person())
             bodies = self._simulation.arrays.bodies
             begin_window(controls, bodies, self._control, self._tables, options, step.walking)
 

@@ -54,13 +54,21 @@ def with_person(file, **settings) -> BipedSettings:
     return BipedSettings(**{"action_mode": "residual", "person": file} | settings)
 
 
-@pytest.mark.parametrize("guide", ["people", "plan"])
-def test_the_network_in_the_step_does_what_its_policy_does(guide, tmp_path) -> None:
-    settings = replace(BOTH, guide=guide)
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"guide": "people"},
+        {"guide": "plan"},
+        {"guide": "people", "speed_range": (0.9, 1.5), "speed_interval": 0.25},
+    ],
+    ids=str,
+)
+def test_the_network_in_the_step_does_what_its_policy_does(given, tmp_path) -> None:
+    settings = replace(BOTH, **given)
     policy = person(settings)
     file = str(tmp_path / "person.safetensors")
     save_policy(file, policy)
-    inside = started(with_person(file, guide=guide))
+    inside = started(with_person(file, **given))
     outside = started(settings)
     observation = outside.observe()
     for _ in range(50):
