@@ -292,7 +292,8 @@ def feet_under_zmp(
     # from the front foot the tip is a step behind.
     zmp_leaves_tip = float(np.interp(toe_tip + margin - step_length, zmp_points, zmp_times))
     rolls = roll > 0 if style is None else style.roll_pitch > 0
-    tip_off = min(float(0.5 + zmp_leaves_tip / stride_time), toe_off) if rolls else toe_off
+    roll_from = 0.5 + (0.0 if style is None else style.roll_from) * (toe_off - 0.5)
+    tip_off = min(max(float(0.5 + zmp_leaves_tip / stride_time), roll_from), toe_off) if rolls else toe_off
     if style is None:
         style = peoples_style(step_length / body.leg_length, roll, flat, toe_off - tip_off)
     elif tip_off == toe_off:

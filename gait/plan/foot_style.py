@@ -71,6 +71,9 @@ class FootStyle:
     heel_off: float | None = None
     """Fraction of the step over which the heel rises before the other foot lands, unless the ZMP passes the toe joint
     later; None: from the moment at which the ZMP passes."""
+    roll_from: float = 0.0
+    """Fraction of double support after which the toe begins to roll over its tip, unless the ZMP leaves the tip later.
+    Until then the foot's centre of pressure is under the flat toe."""
     toe_swing: float | None = None
     """Angle of the toe joint in swing [rad]; None: people's curve."""
 

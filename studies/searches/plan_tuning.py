@@ -11,7 +11,7 @@ searches would add their luck to the change with speed.
 """
 
 import json
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
@@ -49,6 +49,7 @@ from springfoot.gait.plan import (
     style_from,
 )
 
+from ..base.columns import COMPARED_JOINTS
 from ..base.study import Answer, OnProgress, Study
 from .cma_search import asked_of, generations
 from .constants_file import read_styles
@@ -75,6 +76,7 @@ CHOICES: dict[str, tuple[float, float, float, float]] = {
     "roll_pitch": (0.3, 0.15, 0.0, 2.0),
     "heel_rise_1": (0.3, 0.08, 0.05, 0.6),
     "heel_rise_2": (1.5, 0.4, 0.0, 4.0),
+    "roll_from": (0.2, 0.1, 0.0, 0.9),  # of double support
     "roll_power": (2.5, 0.5, 2.0, 9.0),  # below, the pitch's rate would jump
     "via_forward_1": (0.25, 0.05, 0.0, 1.0),  # of the way of the ankle
     "via_forward_2": (0.5, 0.05, 0.0, 1.0),
@@ -102,6 +104,9 @@ LOWEST_SOLE = -0.001
 """Height of the lowest point of the swing foot below which it counts as too low [m]; chosen."""
 PER_METRE_LOW, PER_UNIT = 200.0, 10.0
 """Cost of a swing foot that is too low [1/m], and of a choice outside its bounds, squared; chosen."""
+NEARLY_LEAST, MOST_NEAR = 1.1, 50
+"""Cost over the least cost up to which a plan counts as nearly as good, and how many of those that a search meets are
+held against people; chosen. By how much these differ is the error bar of a prediction by least effort."""
 IMPOSSIBLE = 30.0
 """Cost of an impossible plan, to which the distance of its choices from the start is added; chosen."""
 
@@ -274,21 +279,20 @@ class PlanTuning(Study):
             asked["start"] = begin.tolist()  # of the file its content counts, which may change, not its place
         strategy = cma.CMAEvolutionStrategy(begin.ravel(), self.sigma, options)
         lines = []
-        best_cost = np.inf
-        best = begin.ravel()
+        met: list[tuple[float, NDArray]] = []  # cost and candidate
 
         def costs_of(_: int, candidates: list[NDArray]) -> NDArray:
             """Return the costs of a generation's candidates."""
             return np.array(list(on_each(partial(self._mean_price, body), candidates)))
 
         for generation, vectors, costs in generations(strategy, self.generations, costs_of, self.log, asked):
-            if costs.min() < best_cost:
-                best_cost = float(costs.min())
-                best = vectors[int(np.argmin(costs))]
+            met += zip(costs.tolist(), vectors, strict=True)
             lines.append([generation + 1, float(costs.min()), float(np.median(costs))])
             progress(1)
             if generation % 10 == 9:
                 tqdm.write(f"generation {generation + 1}: best {lines[-1][1]:.4f}, median {lines[-1][2]:.4f}")
+        least, best = min(met, key=lambda one: one[0])
+        near = [candidate for cost, candidate in met if cost <= NEARLY_LEAST * least]
         found = {speed: style_at(self._vector_at(best, speed), self.cadence) for speed in self.found_speeds}
         self._write_styles(found)
         parts = [f"{speed:g} m/s: {json.dumps(style.to_json())}" for speed, style in found.items()]
@@ -302,8 +306,24 @@ class PlanTuning(Study):
                     "the plan": prediction_numbers(gait_of(plan), human),
                 }
                 parts.append(prediction_table(columns, ("the plan",)))
+                parts.append(self._likeness_of(near, body, speed))
         return Answer(
             text="\n\n".join(parts), files={"generations.csv": csv_text(["generation", "best", "median"], lines)}
+        )
+
+    def _likeness_of(self, near: Sequence[NDArray], body: Body, speed: float) -> str:
+        """Return in words how far plans at `speed` [m/s] of candidates that cost nearly the least are from people."""
+        chosen = [near[k] for k in np.unique(np.linspace(0, len(near) - 1, MOST_NEAR).astype(int))]
+        plans = [self._price(body, speed, self._vector_at(candidate, speed))[1] for candidate in chosen]
+        human = human_gait(speed)
+        numbers = [prediction_numbers(gait_of(plan), human)["joints"] for plan in plans if plan is not None]
+        ranges = []
+        for joint in COMPARED_JOINTS:
+            distances = [of_plan[joint]["rmse_deg"] for of_plan in numbers]
+            ranges.append(f"{joint} {min(distances):.1f} to {max(distances):.1f}°")
+        return (
+            f"{len(numbers)} of the {len(near)} plans that the search met within {NEARLY_LEAST - 1:.0%} of its least "
+            f"cost are from people: {', '.join(ranges)}"
         )
 
     def _vector_at(self, candidate: NDArray, speed: float) -> NDArray:

@@ -36,7 +36,7 @@ FOUND = "styles.json"
 PLAN_SPEEDS: dict[float, float | None] = {1.2: None, 1.05: 1.2, 0.9: 1.05, 1.35: 1.2, 1.5: 1.35}
 """Speed of a plan [m/s] -> the one at whose style its search begins; None: at round numbers. Chosen: with one style for
 all speeds a walk changes with speed otherwise than people's."""
-NEXT_SPREAD = 0.3
+NEXT_SPREAD = 0.2
 """First spread of a search that begins at another speed's style, in units of the search; chosen."""
 
 
@@ -48,7 +48,7 @@ class Predict(WalkingStudy):
     """Folder in which each stage keeps its result; the same command goes on there after a stop."""
     plan_generations: int = 300
     """Generations of the search for the plan of least effort at 1.2 m/s."""
-    next_generations: int = 100
+    next_generations: int = 150
     """Generations of the search at each other speed, which begins at its neighbour's style."""
     population: int = 20
     """Candidates in each generation."""

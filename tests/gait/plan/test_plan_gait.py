@@ -92,7 +92,11 @@ def test_no_small_step_from_the_committed_style_costs_much_less():
 def test_the_search_runs_and_leaves_the_file_alone_with_quick(tmp_path, capsys):
     styles = tmp_path / "styles.json"
     assert main(["study", "plan-tuning", "--quick", "--styles", str(styles), "--out", str(tmp_path / "out")]) == 0
-    assert "paid" in capsys.readouterr().out and not styles.exists()
+    said = capsys.readouterr().out
+    assert "paid" in said and not styles.exists()
+    assert re.search(
+        r"\d of the \d plans .* within 10% of its least cost are from people: thigh [\d.]+ to [\d.]+°", said
+    )
     assert (tmp_path / "out" / "generations.csv").is_file()
 
 

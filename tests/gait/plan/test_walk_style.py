@@ -45,6 +45,19 @@ def test_the_hips_moments_hold_the_trunk_upright_or_leaning(body, lean):
     assert plan_walk(body, 1.2).motion.ahead is None
 
 
+def test_a_toe_that_rolls_later_stands_longer_and_its_moment_is_smaller():
+    largest = []
+    for roll_from in (0.0, 0.3, 0.6):
+        plan = plan_walk(Body(), 1.2, style=replace(STYLE, foot=replace(FOOT, roll_from=roll_from)))
+        feet = plan.feet
+        assert feet.tip_off >= 0.5 + roll_from * (feet.toe_off - 0.5) - 1e-12
+        _, cop = foot_force(plan, np.linspace(0.5, feet.tip_off, 50)[:-1])
+        assert np.all(cop <= plan.body.ankle_to_toe_joint + plan.body.toe_length)
+        _, loads = dynamics(plan)
+        largest.append(loads.moment["toe"].max())
+    assert largest[0] > 1.05 * largest[1] and largest[1] > 1.05 * largest[2]
+
+
 def test_over_a_stride_the_joints_do_no_net_work():
     motion, loads = dynamics(plan_walk(Body(), 1.2, style=STYLE))
     turn = motion.rate
