@@ -21,7 +21,6 @@ from springfoot.envs.settings.settings import DEFAULT_WEIGHTS, BipedSettings
 from springfoot.errors import SpringfootError
 from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.files.json_file import read_object
-from springfoot.gait.plan.effort import PRICES
 
 SHORT = TrainingConfig(
     timesteps=3_000,
@@ -91,7 +90,7 @@ def test_the_reward_of_predict_reads_no_likeness():
     task = PRESETS["predict"].environment
     weights = DEFAULT_WEIGHTS | task.reward_weights
     assert task.follows_plan and weights["pose"] == weights["grf"] == weights["step_length"] == 0.0
-    assert [weights[name] / weights["fibre_work"] for name in ("activation", "acceleration")] == [PRICES[1], PRICES[3]]
+    assert all(weights[name] < 0.0 for name in ("fibre_work", "activation", "acceleration", "impact", "speed_held"))
 
 
 def test_a_configuration_without_a_form_is_not_mirrored():
