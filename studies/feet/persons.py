@@ -2,9 +2,9 @@
 
     springfoot study persons learned learned-2
 
-A person is a policy that `springfoot train --preset person` trained. The drawn episodes have feet, proportions and
-loads of that preset, bodies and speeds of `WALKED`, which lie within the preset's, and seeds that no training uses; in
-each the commanded speed stays, and the step time is people's.
+A person is a policy that `springfoot train --preset person`, or `predict`, trained. The drawn episodes have feet,
+proportions, loads, slopes and ground of that preset, bodies and speeds of `WALKED`, and seeds that no training uses; in
+each the commanded speed stays, and the step time is people's. `predict` has sound feet on one body.
 """
 
 from collections.abc import Sequence
@@ -61,7 +61,7 @@ class DrawnEpisode:
 
 def _walked(preset: BipedSettings) -> BipedSettings:
     """Return the settings of the preset with the ranges of `WALKED` and without other step times than people's."""
-    bodies = [body for body in preset.drawn_bodies or () if body.step_time_ratio is None]
+    bodies = [body for body in preset.drawn_bodies or () if body.step_time_ratio is None] or None
     return replace(preset, drawn_bodies=bodies, **WALKED)
 
 
@@ -142,8 +142,7 @@ class Persons(WalkingStudy):
         for name in self.persons:
             act, settings = person_and_settings(name, {})
             ranges = replace(
-                _walked(PRESETS["person"].environment),
-                guide=settings.guide,
+                _walked(PRESETS["predict" if settings.follows_plan else "person"].environment),
                 plan_file=settings.plan_file,
                 acts=settings.acts,
                 stiffness_by="action",
