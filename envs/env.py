@@ -148,6 +148,7 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
     | person_rate    | 0      | squared change of the person's offsets over 0.25 rad, per 20 ms                 |
     | acceleration   | 0      | sum over joints of (acceleration x (50 ms)^2)^2 [rad^2]                         |
     | step_length    | 0      | difference of the last step's length and the planned one, over that             |
+    | activation_rate | 0     | squared rate of the activation x 50 ms, weighted by volume                      |
 
     In `stiffness` K is of muscles, and of an adaptive device. With `ankle_tendon` K_ankle is that of the calf's
     fibres, beyond what they have at rest and by their torque.

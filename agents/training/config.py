@@ -225,6 +225,7 @@ PREDICTED = replace(
         "stiffness_rate": -0.2,
         "fibre_work": -40.0,
         "activation": -6.0,
+        "activation_rate": -6.0,
         "acceleration": -12.0,
         "impact": -6.0,
         "speed_held": -120.0,

@@ -12,7 +12,14 @@ import numpy as np
 from springfoot.arrays import NDArray
 from springfoot.gait.body.body import Body
 from springfoot.gait.body.tissue import ankle_tissue_stiffness, tissue_moments
-from springfoot.gait.plan.effort import TENDON_GIVE, interval_work, metabolic_energy, strengths, volume_weights
+from springfoot.gait.plan.effort import (
+    ACTIVATION_TIME,
+    TENDON_GIVE,
+    interval_work,
+    metabolic_energy,
+    strengths,
+    volume_weights,
+)
 
 from .foot import Feet
 from .kernel import part
@@ -25,7 +32,8 @@ MUSCLES = np.dtype(
         ("tissue", float),  # factor on `tissue_moments`
         ("present", np.int64, _LEGS),  # 1 for a joint with muscles, 0 for a device in their place
         ("give", float, len(JOINTS)),  # of the tendons [rad/(N m)]
-        ("activation", float, (*_LEGS, 2)),  # volume weight over squared strength, extensors and flexors [1/(N m)^2]
+        ("strength", float, (*_LEGS, 2)),  # largest moments of extensors and flexors [N m]
+        ("volume", float, (*_LEGS, 2)),  # their weights in the activation (`volume_weights`)
     ]
 )
 """Constants of the muscles of one body on its feet."""
@@ -42,6 +50,7 @@ MUSCLE_ROW = np.dtype(
         ("moment", float, (3, *_LEGS)),  # mean moment of the fibres in the last three windows, the last first [N m]
         ("energy", float, _LEGS),  # metabolic, of the fibres' work in the step, one window late [J]
         ("activation", float),  # time integral of the squared activation, likewise [s]
+        ("activation_rate", float),  # of its squared rate x `ACTIVATION_TIME`, likewise [s]
         ("positive_work", float),  # of all actuators in the step [J]
     ]
 )
@@ -65,7 +74,8 @@ def muscles_of(body: Body, feet: Feet) -> NDArray:
     row["tissue"] = body.strength_scale  # a load makes no tissue stiffer
     row["give"] = np.array(TENDON_GIVE) / body.strength_scale
     row["present"] = [[joint.has_muscles for joint in joints_of(foot)] for foot in feet]
-    row["activation"] = volume_weights() / leg_strengths(body, feet) ** 2
+    row["strength"] = leg_strengths(body, feet)
+    row["volume"] = volume_weights()
     return row
 
 
@@ -79,11 +89,24 @@ def leg_strengths(body: Body, feet: Feet) -> NDArray:
 
 
 @part
+def _activation(moment, strength):
+    """Return the activation of a joint's muscles at a `moment` [N m], that of flexors negative; `strength` (2,) [N m]
+    of extensors and flexors."""
+    return moment / strength[0 if moment > 0.0 else 1]
+
+
+@part
 def _add_cost_of_last_but_one(row):
-    """Add the cost of the last window but one to the sums `energy` and `activation` of `row`, of `MUSCLE_ROW`."""
+    """Add the cost of the last window but one to the sums `energy`, `activation` and `activation_rate` of `row`, of
+    `MUSCLE_ROW`."""
     for side in range(2):
         for joint in range(4):
             moment = row.moment[1, side, joint]
+            strength = row.muscles.strength[side, joint]
+            volume = row.muscles.volume[side, joint, 0 if moment > 0.0 else 1]
+            now = _activation(moment, strength)
+            rise = now - _activation(row.moment[2, side, joint], strength)
+            next_rise = _activation(row.moment[0, side, joint], strength) - now
             first, second = _interval_work(
                 row.moment[2, side, joint],
                 moment,
@@ -93,7 +116,9 @@ def _add_cost_of_last_but_one(row):
                 row.muscles.give[joint],
             )
             row.energy[side, joint] += _metabolic_energy(first) + _metabolic_energy(second)
-            row.activation += row.muscles.activation[side, joint, 0 if moment > 0.0 else 1] * moment**2 * CONTROL_WINDOW
+            row.activation += volume * now**2 * CONTROL_WINDOW
+            squared_rate = (rise**2 + next_rise**2) / 2 * (ACTIVATION_TIME / CONTROL_WINDOW) ** 2
+            row.activation_rate += volume * squared_rate * CONTROL_WINDOW
 
 
 @part
@@ -128,7 +153,7 @@ def work_muscles(row, m, segments, velocity, control) -> None:
     row.time = m.time
     if row.judged:
         row.judged = 0
-        row.activation = row.positive_work = 0.0
+        row.activation = row.activation_rate = row.positive_work = 0.0
         row.energy[:] = 0.0
     steps = len(velocity)
     timestep = CONTROL_WINDOW / steps

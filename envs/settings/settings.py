@@ -108,6 +108,7 @@ DEFAULT_WEIGHTS = {
     "person_rate": 0.0,
     "acceleration": 0.0,
     "step_length": 0.0,
+    "activation_rate": 0.0,
 }
 """Weight of each reward term (`springfoot.envs.task.reward`); a positive one rewards, the others are costs."""
 

@@ -54,11 +54,13 @@ OFFSET_UNIT = 0.25
 TERMS: tuple[str, ...] = (
     *("alive", "speed", "com_x", "com_z", "zmp", "pose", "grf"),
     *("stiffness_rate", "stiffness", "effort", "fibre_work", "activation", "impact"),
-    *("speed_held", "person_rate", "acceleration", "step_length"),
+    *("speed_held", "person_rate", "acceleration", "step_length", "activation_rate"),
 )
 """Reward terms in the order of their sum: rewards, then costs."""
 ALIVE, SPEED, COM_X, COM_Z, ZMP, POSE, GRF, STIFFNESS_RATE, STIFFNESS, *_ = range(len(TERMS))
-EFFORT, FIBRE_WORK, ACTIVATION, IMPACT, SPEED_HELD, PERSON_RATE, SMOOTHNESS, STEP = range(STIFFNESS + 1, len(TERMS))
+EFFORT, FIBRE_WORK, ACTIVATION, IMPACT, SPEED_HELD, PERSON_RATE, SMOOTHNESS, STEP, ACTIVATION_RATE = range(
+    STIFFNESS + 1, len(TERMS)
+)
 TASK_OPTIONS = np.dtype(
     [
         ("weights", float, len(TERMS)),  # of the reward's terms
@@ -242,7 +244,8 @@ def judge(rows, controls, bodies, table, options, forces, terms) -> None:
     work of hips, knees, ankles and toes in the step over body weight times commanded way: its cost of transport. The
     cost of the muscles (`springfoot.gait.plan.effort`), one control window late: `fibre_work`, metabolic energy of
     their fibres over body weight times commanded way; `activation`, mean over the step of the squared activation by
-    volume, all joints together. `impact`, sum over feet and directions of the squared change of the force since the
+    volume, all joints together; `activation_rate`, the same of `ACTIVATION_TIME` times the rate of the activation.
+    `impact`, sum over feet and directions of the squared change of the force since the
     last step [body weights] x `ACTIVATION_TIME` over the time of a step. `speed_held`, distance of the CoM's mean speed
     (`HELD_SECONDS`) from the commanded one, over that; it does not saturate. `person_rate`, squared change of the
     offsets of rest angles in 20 ms, over `OFFSET_UNIT`, all six together. `acceleration`, sum over joints of the
@@ -290,6 +293,7 @@ def judge(rows, controls, bodies, table, options, forces, terms) -> None:
         terms[i, EFFORT] = muscles.positive_work / (scale.weight * way)
         terms[i, FIBRE_WORK] = muscles.energy.sum() / (scale.weight * way)
         terms[i, ACTIVATION] = muscles.activation / options[0].seconds
+        terms[i, ACTIVATION_RATE] = muscles.activation_rate / options[0].seconds
         terms[i, IMPACT] = _impact(rows[i], forces, i, options[0].seconds)
         terms[i, STEP] = rows[i].step_error
         terms[i, SPEED_HELD] = terms[i, PERSON_RATE] = terms[i, SMOOTHNESS] = 0.0

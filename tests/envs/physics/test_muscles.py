@@ -104,7 +104,8 @@ def test_the_reward_pays_what_a_recording_measures():
         way = settings.speed * 2 * TICK
         paid = terms["fibre_work"][::2].sum() * body.mass * GRAVITY * way
         assert paid == pytest.approx(use.energy.sum(), rel=1e-4)  # of single precision
-        assert terms["activation"][::2].sum() * 2 * TICK == pytest.approx(use.activation.sum(), rel=1e-4)
+        for name, used in (("activation", use.activation), ("activation_rate", use.rate)):
+            assert terms[name][::2].sum() * 2 * TICK == pytest.approx(used.sum(), rel=1e-4), name
 
 
 @pytest.mark.parametrize(("name", "given"), WALKS, ids=str)

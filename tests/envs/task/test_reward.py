@@ -136,13 +136,14 @@ def test_costs_count_what_they_say(thesis_body):
 def test_what_muscles_did_is_paid_over_weight_and_commanded_way(height):
     setup, random = Setup(height=height, mass=45, speed=1.0), np.random.default_rng(0)
     energy = random.uniform(0.0, 1.0, (len(PHASES), 2, 4))
-    work, activation = random.uniform(0.0, 1.0, (2, len(PHASES)))
-    did = {"energy": energy, "positive_work": work, "activation": activation}
+    work, activation, rate = random.uniform(0.0, 1.0, (3, len(PHASES)))
+    did = {"energy": energy, "positive_work": work, "activation": activation, "activation_rate": rate}
     terms = setup.terms(setup.measurement(PHASES), PHASES, muscles=did)
     carried = 45 * GRAVITY * 1.0 * 0.02
     np.testing.assert_allclose(terms["effort"], work / carried, rtol=1e-12)
     np.testing.assert_allclose(terms["fibre_work"], energy.sum((1, 2)) / carried, rtol=1e-12)
     np.testing.assert_allclose(terms["activation"], activation / 0.02, rtol=1e-12)
+    np.testing.assert_allclose(terms["activation_rate"], rate / 0.02, rtol=1e-12)
 
 
 def test_impact_is_the_squared_change_of_the_feets_forces_but_in_the_first_step(thesis_body):
