@@ -79,6 +79,8 @@ def style_from(values: Mapping[str, Any]) -> WalkStyle:
             raise ValueError(f"{name} must be > 0, got {getattr(style.foot, name):g}")
     if style.step_time_ratio <= 0.0:
         raise ValueError(f"step_time_ratio must be > 0, got {style.step_time_ratio:g}")
+    if not 0.0 <= style.foot.roll_from <= 1.0:
+        raise ValueError(f"roll_from must be in [0, 1], got {style.foot.roll_from:g}")
     if style.foot.heel_radius < 0.0:
         raise ValueError(f"heel_radius must be >= 0 m, got {style.foot.heel_radius:g}")
     if len({len(via) for via in (style.foot.via_forward, style.foot.via_up, style.foot.via_pitch)}) > 1:

@@ -4,7 +4,8 @@
 
 A person is a policy that `springfoot train --preset person`, or `predict`, trained. The drawn episodes have feet,
 proportions, loads, slopes and ground of that preset, bodies and speeds of `WALKED`, and seeds that no training uses; in
-each the commanded speed stays, and the step time is people's. `predict` has sound feet on one body.
+each the commanded speed stays, and the step time is people's. `predict` trains on sound feet and one body, so that the
+bodies of `WALKED` are new to its persons.
 """
 
 from collections.abc import Sequence

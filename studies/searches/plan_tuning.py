@@ -291,7 +291,8 @@ class PlanTuning(Study):
             progress(1)
             if generation % 10 == 9:
                 tqdm.write(f"generation {generation + 1}: best {lines[-1][1]:.4f}, median {lines[-1][2]:.4f}")
-        least, best = min(met, key=lambda one: one[0])
+        met.sort(key=lambda one: one[0])
+        least, best = met[0]
         near = [candidate for cost, candidate in met if cost <= NEARLY_LEAST * least]
         found = {speed: style_at(self._vector_at(best, speed), self.cadence) for speed in self.found_speeds}
         self._write_styles(found)
@@ -312,7 +313,7 @@ class PlanTuning(Study):
         )
 
     def _likeness_of(self, near: Sequence[NDArray], body: Body, speed: float) -> str:
-        """Return in words how far plans at `speed` [m/s] of candidates that cost nearly the least are from people."""
+        """Return in words how far plans at `speed` [m/s] are from people, of candidates `near` the best, the first."""
         chosen = [near[k] for k in np.unique(np.linspace(0, len(near) - 1, MOST_NEAR).astype(int))]
         plans = [self._price(body, speed, self._vector_at(candidate, speed))[1] for candidate in chosen]
         human = human_gait(speed)

@@ -131,6 +131,7 @@ def test_the_zmp_of_a_style_goes_as_far_along_a_longer_foot():
         ("foot", "via_pitch", 0.5, "via_pitch must be numbers within ±10, got 0.5"),
         ("walk", "knee", 1e308, r"knee must be a number within ±10, got 1e\+308"),
         ("foot", "roll_power", 0.0, "roll_power must be > 0, got 0"),
+        ("foot", "roll_from", 1.5, r"roll_from must be in \[0, 1\], got 1.5"),
         ("foot", "heel_radius", -0.1, "heel_radius must be >= 0 m, got -0.1"),
         ("walk", "step_time_ratio", 0.0, "step_time_ratio must be > 0, got 0"),
         ("foot", "via_up", [0.1], "via_forward, via_up and via_pitch must be equally many"),
