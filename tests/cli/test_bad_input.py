@@ -104,7 +104,7 @@ SETTINGS = [
     ({"reward_weights": {"alive": "1"}}, "reward_weights['alive'] must be a finite number >= 0 (a reward), got '1'"),
     ({"reward_weights": {"alive": 1j}}, "reward_weights['alive'] must be a finite number >= 0 (a reward), got 1j"),
     ({"reward_weights": "a\nb\x1b[31m"}, "reward_weights must map names of reward terms to numbers, got 'a\\nb\\x1b[31m'"),
-    ({"reward_weights": {"a\x1b[31m": 1.0}}, "reward_weights has no term 'a\\x1b[31m'; valid: alive, speed, com_x, com_z, zmp, pose, grf, stiffness_rate, stiffness, effort, fibre_work, activation, impact, speed_held, person_rate, acceleration, step_length"),
+    ({"reward_weights": {"a\x1b[31m": 1.0}}, "reward_weights has no term 'a\\x1b[31m'; valid: alive, speed, com_x, com_z, zmp, pose, grf, stiffness_rate, stiffness, effort, fibre_work, activation, impact, speed_held, person_rate, acceleration, step_length, activation_rate"),
     ({"episode_seconds": 1e308}, 'episode_seconds must be a finite number >= 0 and <= 1e+09 s, got 1e+308'),
     ({"push_newton": 1e308}, 'push_newton must be a finite number >= 0 and <= 1e+05 N, got 1e+308'),
     ({"push_interval": 1e-300}, 'push_seconds must be a finite number > 0 and <= 1e-300 s (push_interval), got 0.1'),
