@@ -233,8 +233,8 @@ PREDICTED = replace(
     },
 )
 """Task of a person that follows the plan, and begins at generic constants. The reward pays for CoM and ZMP of the plan
-and a held speed, and charges the muscles' energy above all, activation, accelerations and impact; angles and forces do
-not count."""
+and a held speed, and charges the muscles' energy above all, activation and its rate, accelerations and impact; angles
+and forces do not count."""
 
 _PERSON = TrainingConfig(
     timesteps=7_680_000,
