@@ -4,9 +4,11 @@ from collections.abc import Callable
 
 import numpy as np
 from scipy.interpolate import PPoly
-from scipy.linalg.lapack import dgtsv
+from scipy.linalg import get_lapack_funcs
 
 from springfoot.arrays import NDArray
+
+(_solve_tridiagonal,) = get_lapack_funcs(("gtsv",))
 
 
 def periodic_spline(knots: NDArray) -> Callable[[NDArray], PPoly]:
@@ -49,4 +51,4 @@ def _shifted(values: NDArray) -> NDArray:
 
 def _solved(tridiagonal: tuple[NDArray, NDArray, NDArray], right_side: NDArray) -> NDArray:
     """Return the solution (n,) of a system with the matrix `tridiagonal`: its lower, middle and upper diagonal."""
-    return dgtsv(*tridiagonal, right_side[:, None])[3][:, 0]
+    return _solve_tridiagonal(*tridiagonal, right_side[:, None])[3][:, 0]

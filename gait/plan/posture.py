@@ -130,7 +130,7 @@ def legs_under_com(
             break
     return LegPostures(
         hip=hip.T,
-        thigh=thigh + motion.slope,
+        thigh=np.asarray(thigh + motion.slope),
         knee=knee,
         ankle=pitch - thigh + knee,
         toe=toe,
