@@ -245,8 +245,8 @@ def judge(rows, controls, bodies, table, options, forces, terms) -> None:
     cost of the muscles (`springfoot.gait.plan.effort`), one control window late: `fibre_work`, metabolic energy of
     their fibres over body weight times commanded way; `activation`, mean over the step of the squared activation by
     volume, all joints together; `activation_rate`, the same of `ACTIVATION_TIME` times the rate of the activation.
-    `impact`, sum over feet and directions of the squared change of the force since the
-    last step [body weights] x `ACTIVATION_TIME` over the time of a step. `speed_held`, distance of the CoM's mean speed
+    `impact`, sum over feet and directions of the squared change of the force since the last step [body weights] x
+    `ACTIVATION_TIME` over the time of a step. `speed_held`, distance of the CoM's mean speed
     (`HELD_SECONDS`) from the commanded one, over that; it does not saturate. `person_rate`, squared change of the
     offsets of rest angles in 20 ms, over `OFFSET_UNIT`, all six together. `acceleration`, sum over joints of the
     squared mean acceleration in the step x `ACTIVATION_TIME` squared [rad^2]. `step_length`, difference of the

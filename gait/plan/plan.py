@@ -2,9 +2,9 @@
 
 The ZMP runs straight from the rear foot to the front one in double support and along the stance foot in single support.
 The feet follow it: the foot is flat as the ZMP passes its heel, the heel rises as the ZMP passes its toe joint, and in
-a long double support the toe rolls over its tip once the ZMP has passed the tip, so that the ZMP never leaves the
-feet's parts on the ground. The hip is placed so that the CoM of the whole planned body, trunk upright, is the planned
-CoM. On a slope the frame leans with the ground, and the trunk stays upright in the world.
+a long double support the toe rolls over its tip once the ZMP has passed the tip, or later by a style's choice, so that
+the ZMP never leaves the feet's parts on the ground. The hip is placed so that the CoM of the whole planned body, trunk
+upright, is the planned CoM. On a slope the frame leans with the ground, and the trunk stays upright in the world.
 """
 
 from collections.abc import Sequence

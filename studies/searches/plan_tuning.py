@@ -106,7 +106,7 @@ PER_METRE_LOW, PER_UNIT = 200.0, 10.0
 """Cost of a swing foot that is too low [1/m], and of a choice outside its bounds, squared; chosen."""
 NEARLY_LEAST, MOST_NEAR = 1.1, 50
 """Cost over the least cost up to which a plan counts as nearly as good, and how many of those that a search meets are
-held against people; chosen. By how much these differ is the error bar of a prediction by least effort."""
+held against people; chosen. The range of their distances from people tells what least effort leaves open."""
 IMPOSSIBLE = 30.0
 """Cost of an impossible plan, to which the distance of its choices from the start is added; chosen."""
 
