@@ -87,7 +87,7 @@ class Processes:
 
 
 class Checkout:
-    """The repository at a commit, in a folder of its own, and a Python whose springfoot it is."""
+    """The repository at a commit, in a folder of its own, and a Python with it as springfoot."""
 
     def __init__(self, folder: Path, processes: Processes) -> None:
         self.folder = folder.resolve()
@@ -112,7 +112,7 @@ class Checkout:
         self.restore(other)
 
     def restore(self, other: "Checkout") -> None:
-        """Make the files those of another checkout, with the times by which Python and numba know what is compiled."""
+        """Make the files those of another checkout, with the times by which Python and numba know compiled files."""
         shutil.rmtree(self.repository, ignore_errors=True)
         shutil.copytree(other.repository, self.repository, symlinks=True)
 

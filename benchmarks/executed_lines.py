@@ -29,7 +29,7 @@ def start() -> None:
     from coverage import Coverage
 
     repository = Path(os.environ[REPOSITORY])
-    # In memory, and silent: what a test reads from the process stays as it is.
+    # In memory, and silent: a test reads the same from the process as without coverage.
     within = [f"{repository}/*"]
     without = [f"{repository}/tests/*"]
     coverage = Coverage(data_file=None, config_file=False, include=within, omit=without, messages=False)

@@ -42,7 +42,7 @@ class Found:
     refused: Counter[str] = field(default_factory=Counter)
     """Why drawn settings were refused."""
     wrong: list[str] = field(default_factory=list)
-    """What was not finite or not in its space, and in which setting."""
+    """Values not finite or not in their space, each with its setting."""
     memory: list[float] = field(default_factory=list)
     """Resident memory after each setting [MB]."""
     warm: int = 0

@@ -2,8 +2,8 @@
 
     python -m benchmarks.fuzz_readers --seconds 600
 
-`make fuzz` does this; the tests do it for 6 s. Bases are without digests, so that changes reach what stands behind
-those. Memory is that of this process at its peak beyond what it had when the files were made.
+`make fuzz` does this; the tests do it for 6 s. Bases are without digests, so that changes reach the code behind them.
+Memory is that of this process at its peak beyond what it had when the files were made.
 """
 
 import json
@@ -68,7 +68,7 @@ def changed(content: bytes, random: np.random.Generator) -> bytes:
                 data[at:at] = bytes(random.integers(0, 256, random.integers(1, 16), np.uint8))
             case 5:
                 del data[at:]
-            case _:  # twice as often: numbers are what readers are about
+            case _:  # twice as often: readers are about numbers
                 found = _NUMBER.search(data, at)
                 if found:
                     data[found.start() : found.end()] = _TOKENS[random.integers(len(_TOKENS))]

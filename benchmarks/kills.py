@@ -2,7 +2,7 @@
 
 `python -m benchmarks.kills` (`make test-kills`) trains presets walk and any-body in turn, each from a seed of its own:
 once in peace, and once ended several times, by SIGKILL, SIGTERM or SIGINT, and resumed on one thread or two. It prints
-what differs, which should be nothing, and ends with 1 if something does.
+the differences, of which there should be none, and ends with 1 if there are any.
 """
 
 import argparse
@@ -30,11 +30,11 @@ SHORT = (
     *("--timesteps", "2500", "--num-envs", "8", "--update-steps", "256", "--eval-interval", "1024"),
     *("--eval-episodes", "2", "--episode-seconds", "1.5"),
 )
-"""What makes a preset's training one of seconds: 12 updates, and some episodes that end in each."""
+"""Flags that make a preset's training one of seconds: 12 updates, and some episodes that end in each."""
 CLOCKS = ("seconds",)
 """Entries of run.json that are wall time, at any level."""
 CLOCK_SCALARS = ("time/fps",)
-"""Scalars whose values are wall time."""
+"""Scalars that are wall time."""
 
 
 def begun(words: Sequence[str], log: Path) -> int:

@@ -4,8 +4,8 @@
 
 Every learner runs in a virtual environment outside the project's own and writes the policy of before and after its
 training. Both walk the same 20 episodes here, in their own task: PPO has learned if the return after exceeds the return
-before (paired Wilcoxon test, one-sided, p < .01); the others have to run and to give a policy whose actions are finite.
-What is done is kept, so that a stopped run goes on; a changed example or environment is done again.
+before (paired Wilcoxon test, one-sided, p < .01); the others have to run and to give a policy with finite actions.
+Finished work is kept, so that a stopped run goes on; a changed example or environment is done again.
 """
 
 import hashlib
@@ -41,7 +41,7 @@ SIGNIFICANT = 0.01
 SHORT = 8192
 """Steps of a learner that only has to run."""
 TASK = BipedSettings(episode_seconds=10.0, push_newton=150.0)
-"""What every example trains on."""
+"""Task of every example."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,7 +50,7 @@ class Learner:
 
     name: str
     packages: tuple[str, ...]
-    """Whose versions are told."""
+    """Packages whose versions are told."""
     example: str
     flags: tuple[str, ...] = ()
     timesteps: int = 131_072

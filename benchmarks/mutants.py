@@ -2,7 +2,7 @@
 
 `python -m benchmarks.mutants` (`make mutants`) draws mutants of the newest commit by a seed. Each runs in a copy of the
 repository, never in the repository itself: first the test files that execute its line, the quickest first, until one
-test fails; what survives them gets all others. Before, once a commit, each test file runs alone and tells its lines.
+test fails; survivors get all others. Before, once a commit, each test file runs alone and tells its lines.
 All is kept in build/mutants/COMMIT, and the same command goes on after a stop.
 
 The same mutants before and after a change of the code, wherever its files lie afterwards:
@@ -128,7 +128,7 @@ def _measure(base: Checkout, name: str) -> MeasuredFile:
     begin = time.monotonic()
     done = base.python([*PYTEST, name], variables={FOLDER: str(folder), REPOSITORY: str(base.repository)})
     seconds = time.monotonic() - begin
-    passes = done.code in PASSED or base.python([*PYTEST, name]).code in PASSED  # coverage may be what it fails of
+    passes = done.code in PASSED or base.python([*PYTEST, name]).code in PASSED  # it may fail because of coverage
     lines: dict[str, set[int]] = {}
     for path in folder.glob("*.json"):
         for file, numbers in json.loads(path.read_text(encoding="utf-8")).items():

@@ -22,7 +22,7 @@ COMPARISONS = {
     "==": ("!=",),
     "!=": ("==",),
 }
-"""Comparison: what replaces it."""
+"""Comparison: its replacements."""
 SIGNS: dict[type[ast.operator], tuple[str, str]] = {ast.Add: ("+", "-"), ast.Sub: ("-", "+")}
 """Operator: its text, and the text that replaces it."""
 TEXT_OR_LIST = (ast.JoinedStr, ast.List, ast.Tuple, ast.ListComp)

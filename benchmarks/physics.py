@@ -5,9 +5,9 @@
     python -m benchmarks.physics --vary joints
     python -m benchmarks.physics --vary stairs
 
-Every row walks the same policies from the same seeds, and differs from the default in what the row says. The walk is
-held against that of the first row: with `--vary settings` the finest timestep, with `--vary joints` the default. What
-a physics setting costs is `mj_step` alone over a control window, on recorded walking states.
+Every row walks the same policies from the same seeds, and differs from the default as the row says. The walk is
+held against that of the first row: with `--vary settings` the finest timestep, with `--vary joints` the default. The
+cost of a physics setting is that of `mj_step` alone over a control window, on recorded walking states.
 """
 
 import sys
@@ -37,7 +37,7 @@ from .walking import Physics, Walk, record_walk
 COLUMNS = ("thigh_flexion_deg", "knee_flexion_deg", "ankle_dorsiflexion_deg")
 """Mean curves that are held against the reference's."""
 BODIES = 16
-"""Walking bodies whose physics is timed."""
+"""Walking bodies with timed physics."""
 
 
 def costs(models: list[mujoco.MjModel], walk: Walk, rounds: int) -> NDArray:

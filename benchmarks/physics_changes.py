@@ -65,7 +65,7 @@ ROWS: dict[str, Edit] = {
     "no joint stops": _flag(_DISABLE.mjDSBL_LIMIT, True),
     "no force sensors": _flag(_DISABLE.mjDSBL_SENSOR, True),
 }
-"""What a row changes of the default model; the first one is the reference. 4 ms does not divide a control window."""
+"""Changes of the default model, by row; the first row is the reference. 4 ms does not divide a control window."""
 
 
 LEGS = ("hip", "knee")
@@ -84,8 +84,8 @@ JOINT_ROWS: dict[str, tuple[str, tuple[str, ...], float]] = {
         for factor in factors
     },
 }
-"""What a row changes: which constant of `envs.physics.model`, at which joints, by which factor. The leg constants stay
-those that were tuned with the default; the first row is the reference."""
+"""Changes by row: a constant of `envs.physics.model`, the joints, the factor. The leg constants stay those that
+were tuned with the default; the first row is the reference."""
 
 
 @contextmanager

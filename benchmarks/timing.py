@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 PACKAGES = ("springfoot", "mujoco", "numpy", "gymnasium", "stable-baselines3", "torch", "numba", "envpool")
-"""Whose versions decide the figures."""
+"""Packages whose versions decide the figures."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -106,7 +106,7 @@ class SegmentedFootBipedVector(  # pyright: ignore[reportIncompatibleVariableOve
         return self.biped.observe(), _infos(self._start_values(), np.zeros(self.num_envs, int), mask)
 
     def step(self, actions: NDArray) -> tuple[NDArray, NDArray, NDArray, NDArray, dict[str, Any]]:
-        """Hold what `actions` (N, A) set, the stiffnesses by default, during a step, 20 ms by default.
+        """Hold the values set by `actions` (N, A), the stiffnesses by default, during a step, 20 ms by default.
 
         Environments whose episode is over are reset as `autoreset_mode` says: in this step in place of a step of their
         own, or with "SameStep" at the end of the step in which it ends.

@@ -37,7 +37,7 @@ def main() -> None:
     observations = np.concatenate([episode.observations[:-1] for episode in episodes]).astype(np.float32)
     actions = np.concatenate([episode.actions for episode in episodes]).astype(np.float32)
     mean, variance = observations.mean(axis=0), observations.var(axis=0)
-    variance[variance < 1e-6] = 1e12  # what never varies tells nothing
+    variance[variance < 1e-6] = 1e12  # a constant tells nothing
     inputs = torch.from_numpy(((observations - mean) / np.sqrt(variance)).clip(-10, 10).astype(np.float32))
     targets = torch.from_numpy(actions)
     network = nn.Sequential(nn.Linear(inputs.shape[1], 64), nn.Tanh(), nn.Linear(64, 64), nn.Tanh(), nn.Linear(64, 4))

@@ -31,7 +31,7 @@ def main() -> None:
     envs.reset(seed=0)
     walking = np.ones(args.num, bool)
     seconds, distance = np.zeros(args.num), np.zeros(args.num)
-    while walking.any():  # who has fallen is put back and walks on, and is not looked at any more
+    while walking.any():  # a fallen body is put back and walks on, but no longer counts
         _, _, terminated, truncated, info = envs.step(actions)
         seconds[walking] = info["time"][walking]
         distance[walking] += 0.02 * info["speed"][walking]

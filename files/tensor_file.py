@@ -31,7 +31,7 @@ def write_tensors(path: Path, key: str, header: dict[str, Any], tensors: Mapping
     Raises `SpringfootError` for a file that would be too large to read, and the errors that `json` raises for another
     header.
     """
-    json.dumps(header, allow_nan=False)  # raises for what is no JSON
+    json.dumps(header, allow_nan=False)  # raises for values that are no JSON
     packed = {name: np.asarray(tensor, order="C") for name, tensor in tensors.items()}
     text = _text(header | {DIGEST: digest_of(header, packed)})  # one entry: safetensors has no order of several
     content = to_safetensors(packed, {key: text})

@@ -168,7 +168,7 @@ def _with_decimal_point(cell: str) -> str:
 
 
 def text_lines(path: Path) -> Iterator[str]:
-    """Yield the lines of a text file whose digest, if it has one, fits; raise `SpringfootError` for any other file."""
+    """Yield the lines of a text file with a fitting digest or none; raise `SpringfootError` for any other file."""
     content = read_bytes(path)
     require_unchanged(path, content)
     if b"\0" in content:

@@ -41,10 +41,10 @@ def export_policy(policy: Policy, out: str | Path) -> list[Path]:
         policy: policy of this version, from `read_policy`.
         out: new file, ending in .onnx. Beside it appears its contract, OUT.json.
 
-    The graph takes the raw observation (N, D) and returns the action (N, A), and what it sets: stiffness (`Scale`),
-    offsets of a person's rest angles (`REST_OFFSETS`), or both. All are float32, the actions within 1e-5 of the
-    policy's own. Raises `SpringfootError`, with nothing written, for another ending, for files that exist, and without
-    the package onnx.
+    The graph takes the raw observation (N, D) and returns the action (N, A), and the values that it sets: stiffness
+    (`Scale`), offsets of a person's rest angles (`REST_OFFSETS`), or both. All are float32, the actions within 1e-5 of
+    the policy's own. Raises `SpringfootError`, with nothing written, for another ending, for files that exist, and
+    without the package onnx.
     """
     files = planned_files(out)
     contract = json.dumps(contract_of(policy), indent=1, allow_nan=False) + "\n"
@@ -218,7 +218,7 @@ def onnx_bytes(policy: Policy, contract: str) -> bytes:
     """Return the content of the ONNX file: input `observation` (N, D), outputs `action` (N, A), and by its name that of
     the `Scale`, then `REST_OFFSETS`, where the policy has them.
 
-    The graph computes `Policy.__call__` in float32, then what its actions set. The metadata holds `contract`.
+    The graph computes `Policy.__call__` in float32, then the values its actions set. The metadata holds `contract`.
     """
     import onnx  # an extra of its own
     from onnx import helper, numpy_helper

@@ -83,7 +83,7 @@ def read_checkpoint(path: Path) -> Checkpoint:
 
 def _require_header(header: dict[str, Any]) -> None:
     """Raise `SpringfootError`, KeyError, TypeError or ValueError for a header that no training writes."""
-    json.dumps(header, allow_nan=False)  # raises for what is not finite
+    json.dumps(header, allow_nan=False)  # raises for a number that is not finite
     try:
         check_type(header, Header, collection_check_strategy=CollectionCheckStrategy.ALL_ITEMS)
     except TypeCheckError as error:

@@ -207,7 +207,7 @@ class Learner:
 def _network_words(
     shapes: Sequence[tuple[int, ...]], activation: str, output: str, clip: float | None, mirrored: bool
 ) -> str:
-    """Return a network in words: the widths of the layers whose weights have these `shapes`, activation, bounds of
+    """Return a network in words: the widths of the layers with weights of these `shapes`, activation, bounds of
     output and normalised observation, and whether it acts for one leg."""
     widths = " - ".join(map(str, [shapes[0][1], *(outputs for outputs, _ in shapes)]))
     bounds = f"output by {output}, observations within {'any size' if clip is None else f'{clip:g}'}"

@@ -75,7 +75,7 @@ def best_of(record: Mapping[str, Any]) -> dict[str, Any] | None:
 
 
 def evaluations_of_one_task(record: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return the entries of `evaluations` whose returns can be compared, in their order.
+    """Return the entries of `evaluations` with comparable returns, in their order.
 
     After a session that changed the task and measured the best policy anew, they are that measurement and the later
     evaluations; earlier ones are left out.

@@ -86,7 +86,7 @@ class FootJoint:
 
     @property
     def is_locked(self) -> bool:
-        """Return True for a joint whose device is `LOCK`."""
+        """Return True for a joint with the device `LOCK`."""
         return self.device == LOCK
 
 

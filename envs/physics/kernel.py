@@ -60,7 +60,7 @@ class _KernelCache(FunctionCache):
         """Return the cached kernel; None if there is none, or if its files are damaged, which are then emptied."""
         try:
             return super().load_overload(sig, target_context)
-        except Exception:  # what is cut short ends in any exception of pickle
+        except Exception:  # a file cut short ends in any exception of pickle
             with suppress(OSError):
                 self.flush()
             return None

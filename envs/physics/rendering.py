@@ -60,7 +60,7 @@ class Camera:
             self._window, self._drawing = _open_window(model, self._data)
         else:
             self._renderer = _renderer(model)
-        atexit.register(_close, weakref.ref(self))  # runs before what ends OpenGL, as that was registered earlier
+        atexit.register(_close, weakref.ref(self))  # runs before the end of OpenGL, which was registered earlier
 
     def show(self, data: mujoco.MjData, model: mujoco.MjModel | None = None) -> NDArray | None:
         """Return one frame of `data`: uint8 (HEIGHT, WIDTH, 3), or None after drawing it in the window in real time.

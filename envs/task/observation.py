@@ -164,6 +164,6 @@ class SensorNoise:
         if not self._on:
             return observation
         noisy = observation.astype(float)
-        noisy[:, :_SHORT] += self._noise  # what a person knows besides has none
+        noisy[:, :_SHORT] += self._noise  # a person's further knowledge has none
         count = observation.shape[1]
         return np.clip(noisy, LOW[:count], HIGH[:count]).astype(np.float32)

@@ -24,7 +24,7 @@ TASK_ROW = np.dtype(
         ("height_ratio", float),  # height over 1.70 m
         ("steps", np.int64),  # since the episode began
         ("force", float, (len(SIDES), len(CONTACTS), 2)),  # (forward, up) on each contact, mean over the last step [N]
-        ("worn", float, WORN),  # of the observation: what the person knows of body and feet
+        ("worn", float, WORN),  # of the observation: the person's knowledge of body and feet
         ("mean_speed", float),  # of the CoM, over `HELD_SECONDS` before the last step [m/s]
         ("velocity", float, (len(SIDES), len(JOINTS))),  # of the joints at the last step's end [rad/s]
         ("left_phase", float),  # stride phase of the left leg at the last step's end

@@ -42,7 +42,7 @@ def judged_rows(folder: Path) -> list[JudgedRow]:
     name.
 
     Raises `SpringfootError` for a bad submission, for two with the same returns on a task, and for a judgement that is
-    damaged, of another policy or task, or with impossible numbers. A judgement is trusted: who keeps the folder makes
+    damaged, of another policy or task, or with impossible numbers. A judgement is trusted: the folder's keeper makes
     it, by `springfoot judge`.
     """
     rows = []

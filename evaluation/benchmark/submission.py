@@ -61,7 +61,7 @@ class Submission:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Judgement:
-    """What repeating a submission gave."""
+    """Result of repeating a submission."""
 
     repeated: TaskWalks
     """The public seeds again."""

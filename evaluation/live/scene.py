@@ -48,7 +48,7 @@ def fit_to_screen(client: viser.ClientHandle) -> None:
         camera.position = NARROW_STANDPOINT
         camera.look_at = NARROW_MIDDLE
     elif camera.image_width < WIDE:
-        # Half of the panel's width, in metres where the body walks: the body is in the middle of what is free.
+        # Half of the panel's width, in metres where the body walks: the body is in the middle of the free part.
         metres_a_pixel = -2 * STANDPOINT[1] * np.tan(camera.fov / 2) / camera.image_height
         aside = np.array([INPUTS_WIDTH / 2 * metres_a_pixel, 0.0, 0.0])
         camera.position = STANDPOINT + aside

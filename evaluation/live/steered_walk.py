@@ -309,7 +309,7 @@ class LiveSession:
         settings = self._settings
         if settings.acts == "person":  # and sets no stiffness
             return whole
-        action = whole[:, : len(ACTIONS)].reshape(len(SIDES), len(SPRINGS))  # a view; what acts as a person follows
+        action = whole[:, : len(ACTIONS)].reshape(len(SIDES), len(SPRINGS))  # a view; the actions of a person follow
         body = self.body
         wishes = self.wishes
         residual = settings.action_mode == "residual"

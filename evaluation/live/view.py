@@ -84,7 +84,7 @@ class LiveView:
         accept_values_only(self._server)
         self._gui = self._server.gui
         _set_theme(self._gui)
-        self._dark: set[int] = set()  # numbers of the browsers whose page is dark
+        self._dark: set[int] = set()  # numbers of the browsers with a dark page
         self._curves: dict[int, dict[str, Any]] = {}  # number of a browser -> its charts
         self._server.on_client_connect(self._welcome)
         self._server.on_client_disconnect(self._forget)

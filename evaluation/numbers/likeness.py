@@ -15,7 +15,7 @@ from springfoot.gait.people.gait_events import PERCENT
 ANGLE_JOINTS = ("thigh", "knee", "ankle", "toe")
 """Joints whose angle is held against people's; the thigh's is to the vertical."""
 MOMENT_JOINTS = ("hip", "knee", "ankle")
-"""Joints whose moment of people is known."""
+"""Joints with a known moment of people."""
 LATE_SWING_PERCENT = 80
 """Percent of the stride from which the hip holds the leg back before it lands."""
 

@@ -62,7 +62,7 @@ def policy_data(
 
 
 def people_words(settings: BipedSettings, human: HumanGait) -> str:
-    """Return the words on the page's grey curves: whose mean they are, and of which sample their band is the SD."""
+    """Return the words on the page's grey curves: the people of their mean, and the sample of their band's SD."""
     if settings.human is None:
         return f"people at {human.speed:.2f} m/s, mean ± SD over {ADULTS} adults"
     borrowed = ", of people where it has no data" if human.borrowed else ""

@@ -120,7 +120,7 @@ def _walker_lines(
     spoken: Sequence[Mapping[str, str]],
     words_of: Callable[[FootSetting], str] | None,
 ) -> list[str]:
-    """Return the HTML of a line on each policy's walker and its falls, after a line on what several have in common.
+    """Return the HTML of a line on each policy's walker and its falls, after a line on the parts common to all.
 
     Args:
         metrics: content of metrics.json of each policy.

@@ -83,7 +83,7 @@ def mean_over_phase(phase: NDArray, values: NDArray) -> NDArray:
     `values` is (n, C), `phase` (n,) their phases in [0, 1). A curve is linear between its knots, and fitted by least
     squares with a penalty on curvature (`SMOOTHING`).
     """
-    # Each value lies between two knots, whose weights are 1 - fraction and fraction.
+    # Each value lies between two knots, with the weights 1 - fraction and fraction.
     knot = np.minimum((phase * MEAN_KNOTS).astype(int), MEAN_KNOTS - 1)
     next_knot = (knot + 1) % MEAN_KNOTS
     fraction = phase * MEAN_KNOTS - knot

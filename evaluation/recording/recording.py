@@ -245,8 +245,8 @@ def record_each(
     """Record, as `record` does, one episode for each of E bodies and speeds, episode i from seed `seed` + i.
 
     Returns a recording for each, with the settings of its body and speed. `walkers` holds `height` [m], `mass` [kg] and
-    `speed` [m/s], (E,) each, within the ranges that the `settings` draw from. Raises `SpringfootError` for settings
-    whose commanded speed changes within an episode.
+    `speed` [m/s], (E,) each, within the ranges that the `settings` draw from. Raises `SpringfootError` for a
+    commanded speed that changes within an episode.
     """
     if settings.speed_interval is not None:
         raise SpringfootError(

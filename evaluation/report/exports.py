@@ -94,7 +94,7 @@ def opensim_forces(recording: Recording) -> dict[str, NDArray]:
     for side, name in enumerate(SIDES):
         force = series["force"][:, side]
         contact_x = mid_tick(series["contact"][:, side, :, 0])
-        pressing = force[..., 1] - slope * force[..., 0]  # times the slope's cosine: what presses on the ground
+        pressing = force[..., 1] - slope * force[..., 0]  # times the slope's cosine: the normal force
         total = pressing.sum(axis=1)
         loaded = total > 0.0
         centre = (pressing * contact_x).sum(axis=1) / np.where(loaded, total, 1.0)

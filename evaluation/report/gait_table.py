@@ -182,7 +182,7 @@ BOTH_LEGS = (
     "both legs: means of the two; feedback: of legs whose stiffness the policy sets",
     "stiffness of both legs: without a joint that is locked",
 )
-"""Lines of the legend for a walk whose feet differ."""
+"""Lines of the legend for a walk with different feet."""
 WORDS = (
     "BW: body weights; J/kg: of one leg in a stride (energy: of both; CoM: in a step)",
     "cost of transport: positive work of joints / (weight · distance), no unit",

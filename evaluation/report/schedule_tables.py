@@ -75,7 +75,7 @@ def states_json(table: Mapping[str, Any]) -> str:
 
 
 def table_of_states(policy: str, body: Body, speed: float, states: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return the content of a table of finite states of the policy whose name is `policy`; `states` are those of
+    """Return the content of a table of finite states of the policy named `policy`; `states` are those of
     `finite_states`."""
     return {
         "format": "springfoot finite states",

@@ -202,7 +202,7 @@ def _plate_forces(plates: Iterable[Any], feet: Mapping[str, tuple], frames: int)
     """Return side -> force up and forward (T,) [N] of each foot that stood on a plate, T the number of `frames`.
 
     `plates` are ezc3d's; `feet` is side -> markers of heel and toe (3, T), None if missing. Each contact on a plate
-    belongs to the foot whose markers are nearest to its centre of pressure; without markers no foot has a force.
+    belongs to the foot with the markers nearest to its centre of pressure; without markers no foot has a force.
     """
     if any(marker is None for pair in feet.values() for marker in pair):
         return {}

@@ -62,12 +62,12 @@ def _trial(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Trial:
 
 def main() -> None:
     """Run the child process: read the C3D file named on the command line, write its curves to standard output."""
-    import ezc3d  # noqa: F401  # before the bounds, which do not count what imports take
+    import ezc3d  # noqa: F401  # before the bounds, which do not count the cost of imports
 
     from .c3d_file import read_c3d
 
     out = os.dup(1)
-    os.dup2(2, 1)  # what libraries print goes to standard error
+    os.dup2(2, 1)  # output of libraries goes to standard error
     bound_resources()
     arrays: dict[str, np.ndarray] = {}
     try:

@@ -173,7 +173,7 @@ def require_plausible_legs(walk: MeasuredWalk, side: str, mass: float | None, pe
             continue
         mean = {curve: values.mean(axis=0) for curve, values in curves.items()}
         columns = COLUMNS | {curve: column for (side_of, curve), column in walk.columns.items() if side_of == leg}
-        # What the file gives unscaled, `cut_strides` has divided by the mass.
+        # `cut_strides` has divided the file's unscaled curves by the mass.
         divided = {curve for side_of, curve in walk.unscaled if side_of == leg}
         require_plausible(name, mean, people, mass_given=is_mass_given(walk, mass), columns=columns, divided=divided)
 
@@ -288,7 +288,7 @@ def _mistaken_unit(kind: str, size: float, divided: bool) -> str:
 
 
 def _doubts_of_zero(mean: Curves, usual: Curves, columns: Mapping[str, str]) -> Iterator[str]:
-    """Yield a text for each angle whose mean is far from people's, as if counted from another zero; arguments as in
+    """Yield a text for each angle with a mean far from people's, as if counted from another zero; arguments as in
     `_doubts`."""
     for curve in (name for name in mean if name in ANGLE_CURVES):
         offset = float(mean[curve].mean() - usual[curve].mean())

@@ -45,7 +45,7 @@ COLUMNS = {
 FORCES = ("grf_vertical", "grf_forward")
 """Curves with a series over stance alone."""
 ADULTS = 20
-"""Measured people (Bovi et al. 2011), of whom `sd` is the spread; the toe joint and the centre of pressure are of
+"""Measured people (Bovi et al. 2011), `sd` their spread; the toe joint and the centre of pressure are of
 others."""
 HARMONICS = 12
 """Fourier terms above the mean of angles, moments and powers: angles within 0.2 deg rms at all speeds."""

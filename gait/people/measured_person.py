@@ -60,7 +60,7 @@ LONGEST_SKIP = 1e4
 """Longest start of a walk that may be left out [s]; chosen."""
 LONG_WALK = 10.0
 """Time from which the first `WARM_UP` of a walk does not count [s]; chosen. A simulation begins in a state that is not
-yet its gait, and of a laboratory's treadmill these are 3 of ten strides or more, whose belt may still speed up; walks
+yet its gait, and on a laboratory's treadmill, whose belt may still speed up, these are 3 of ten strides or more; walks
 over ground, which begin before the cameras see them, are shorter."""
 
 LATE_STANCE, MID_STANCE = (0.7, 1.0), (0.25, 0.6)

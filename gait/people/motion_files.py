@@ -71,7 +71,7 @@ class Trial:
     columns: Sequence[str] = ()
     """Names of the file's columns, if it is a text file."""
     column_of: Mapping[tuple[str, str], str] = field(default_factory=dict)
-    """(side, curve) -> its column in the file, of curves whose column is not that of `COLUMNS`."""
+    """(side, curve) -> its column in the file, where that is not the one of `COLUMNS`."""
     notes: tuple[str, ...] = ()
     """Sentences on guesses."""
 

@@ -117,7 +117,7 @@ class _Section(NamedTuple):
     """Column -> its unit in lower case without blanks and dots, such as nmm/kg."""
 
     def in_units(self, column: str, factors: Mapping[str, float]) -> NDArray:
-        """Return a column in the unit whose factor is 1, NaN where a cell is empty.
+        """Return a column in the unit with factor 1, NaN where a cell is empty.
 
         Raises `SpringfootError` for a unit without a factor.
         """

@@ -95,7 +95,7 @@ class MeasuredWalk:
     speed_column: str = PARAMETERS["speed"]
     """Column that tells the speed."""
     columns: Mapping[tuple[str, str], str] = field(default_factory=dict)
-    """(side, curve) -> its column in a file, of curves whose column is not that of `COLUMNS`."""
+    """(side, curve) -> its column in a file, where that is not the one of `COLUMNS`."""
     trusted: bool = False
     """True to count all strides on a plate, though a part of the force may be missing, as of walkers with a cane."""
     notes: tuple[str, ...] = ()
@@ -184,7 +184,7 @@ def merge_trials(trials: Sequence[Trial]) -> MeasuredWalk:
     legs: dict[str, Series] = {}
     columns: dict[tuple[str, str], str] = {}
     unscaled = set()
-    unsigned = {}  # side -> curves whose sign is that of the model's coordinate
+    unsigned = {}  # side -> curves with the sign of the model's coordinate
     heading = -1.0 if any(trial.backward for trial in trials) else 1.0  # often another file's than the forces'
     for trial in trials:
         for side, curves in trial.legs.items():
@@ -334,7 +334,7 @@ def _legs_by_weight(walk: MeasuredWalk, weight: float | None) -> dict[str, LegSt
 
 
 def _stands_whole(walk: MeasuredWalk, name: str, leg: LegStrides, weight: float) -> NDArray:
-    """Return (S,) True for strides of the leg `name` whose force is that of a whole stance.
+    """Return (S,) True for strides of the leg `name` with the force of a whole stance.
 
     Such a force reaches `LEAST_PEAK`, and does not end before the foot leaves the ground by its motion, but for
     `EARLY_END`. `weight` is the body's, in the unit of the force.
@@ -579,10 +579,10 @@ def _body_weight(force: NDArray) -> float:
 
 
 def _on_plate(vertical: NDArray, weight: float | None) -> NDArray:
-    """Return (S,) True for strides whose stance was on a force plate; `vertical` (S, 101) is their vertical force, and
+    """Return (S,) True for strides with the stance on a force plate; `vertical` (S, 101) is their vertical force, and
     `weight` as in `_legs_by_weight`."""
     low, high = WEIGHT_BEARING
-    # A foot on a plate bears most of the body weight there; 0.3 of it is beyond what noise shows.
+    # A foot on a plate bears most of the body weight there; 0.3 of it is beyond noise.
     return vertical[:, low : high + 1].min(axis=1, initial=np.inf) > 0.3 * (weight or _body_weight(vertical))
 
 

@@ -265,7 +265,7 @@ def pivoted_com(
     """Return the function (height, ahead) -> CoM motion of `periodic_com`, with a pivot `ahead` of the CoM.
 
     `ahead` [m] is a function of the time [s] (`ComMotion`): x + ahead replaces x on the right-hand side of the
-    equation. What depends on neither argument is computed once. The equation is linear, so each of about
+    equation. Terms that depend on neither argument are computed once. The equation is linear, so each of about
     `STEP_SAMPLES` intervals in a step of the walk is a matrix on (x, x', 1), by the method of Runge and Kutta. The
     product of these matrices gives the periodic start.
     """

@@ -122,7 +122,7 @@ def _phase_spring(edges: tuple[float, float], torque: NDArray, angle: NDArray, v
             if deviation_product > 0
             else None
         )
-        # What velocity does not explain; without a correlation it explains nothing.
+        # The spread without the part that velocity explains; without a correlation it explains nothing.
         spread = float(np.sqrt(angle_deviation @ angle_deviation / count * (1 - (correlation or 0.0) ** 2)))
         if correlation is not None and abs(correlation) > COLLINEAR:
             reasons.append(f"angle and velocity are nearly collinear (r = {correlation:.3f})")

@@ -198,7 +198,7 @@ def _phase_spring(data: _Data, low: float, high: float, margin: float, spacing: 
     )
     curvatures = [angle**2, angle * np.abs(angle)]
     knot_weights = _knot_weights(phase, first, last, spacing)
-    # The angle less what velocity explains; the tiny number is for a velocity of 0 throughout.
+    # The angle less the part that velocity explains; the tiny number is for a velocity of 0 throughout.
     unexplained = angle - velocity * (angle @ velocity) / max(velocity @ velocity, 1e-300)
     spread = float(np.sqrt(np.mean(unexplained**2)))
     # d torque = -K d angle - K beta d velocity, K and K beta linear between knots; then with further states besides.

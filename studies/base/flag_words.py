@@ -28,7 +28,7 @@ _PLAIN: dict[Any, tuple[Callable[[str], Any], str]] = {
 
 
 def flag_of(kind: Any) -> tyro.constructors.PrimitiveConstructorSpec:
-    """Return tyro's reader of a flag whose value is of type `kind`, such as `tuple[float, float] | None`.
+    """Return tyro's reader of a flag of type `kind`, such as `tuple[float, float] | None`.
 
     The word `None` is a value only of types that can be None. A flag of type `bool` alone means True.
     """

@@ -121,7 +121,7 @@ def optional_flags(
     themes: Mapping[str, str] = THEMES,
     refused: Mapping[str, str] = MappingProxyType({}),
 ) -> type:
-    """Return a dataclass with every field of `settings` as an optional flag, whose default is `NOT_GIVEN`.
+    """Return a dataclass with every field of `settings` as an optional flag with the default `NOT_GIVEN`.
 
     Args:
         name: name of the returned dataclass.

@@ -73,7 +73,7 @@ class Study:
         Returns the exit code: 0, or 1 if a part of the study failed. Raises `SpringfootError`, with nothing written,
         for a bad flag and for an `out` that exists.
         """
-        self.check()  # what --quick replaces, too
+        self.check()  # flags that --quick replaces, too
         study = replace(self, **self.QUICK) if self.quick else self
         study.check()
         if study.out is not None and is_taken(study.out):

@@ -1,9 +1,9 @@
-"""Hold the price of a walk against conditions whose answer is known: the controls that come before patients.
+"""Hold the price of a walk against conditions with a known answer: the controls that come before patients.
 
     springfoot study controls
     springfoot study controls learned
 
-With the policy `schedule` one sound person walks whom nobody adapts; a learned person adapts to each condition. A
+With the policy `schedule` one sound person walks and adapts to nothing; a learned person adapts to each condition. A
 device that does nothing must cost nothing, and one that takes over a part of a tendon's return must not look
 like a large saving. Conditions are compared where all walk equally fast (`walked_speeds`), under both prices.
 """

@@ -242,8 +242,8 @@ class FootChoice(WalkingStudy):
         return self.speed * (1.0 - OTHER_SPEED)
 
     def introduction(self, answer: str) -> str:
-        """Return Markdown to stand above the walks of report.html: the `answer` over all persons, what it cannot say,
-        and whose walks they are."""
+        """Return Markdown to stand above the walks of report.html: the `answer` over all persons, its limits, and the
+        person of the walks."""
         first, *others = self.persons
         whose = f"{first}, the first of {len(self.persons)} persons" if others else f"{first}, the one person"
         below = f"Curves and verdicts below: {whose}."

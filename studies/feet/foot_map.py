@@ -155,7 +155,7 @@ def map_table(rows: Sequence[Row]) -> str:
 
 def _fibre_work_change(compared: Sequence[tuple[Row, Row]]) -> str:
     """Return the mean change of fibre work from the first to the second row of each pair, and the number of pairs;
-    pairs whose second row has no fibre work are left out."""
+    pairs without fibre work in the second row are left out."""
     changes = [
         second["fibre_J_kg_m"] / first["fibre_J_kg_m"] - 1.0 for first, second in compared if second["fibre_J_kg_m"]
     ]

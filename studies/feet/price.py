@@ -1,4 +1,4 @@
-"""Show how much the price of a walk changes with numbers that are known roughly: two tendons, and what a torque brings.
+"""Show how much the price of a walk changes with numbers known roughly: two tendons, and the rise of K with torque.
 
     springfoot study price
 

@@ -3,8 +3,8 @@
     springfoot study landscape learned
 
 The stiffness stays the same over the whole stride and is set for the person, who knows that and moves hips, knees and
-the springs' rest angles. So the map tells where a walk lies if only its stiffness differs: who falls, undisturbed and
-pushed, what a metre costs at equal walked speed, and how far the walk is from people's.
+the springs' rest angles. So the map tells where a walk lies if only its stiffness differs: its falls, undisturbed and
+pushed, its cost of a metre at equal walked speed, and its distance from people's.
 """
 
 from collections.abc import Mapping, Sequence

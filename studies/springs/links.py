@@ -68,7 +68,7 @@ def compared(
     inner: Mapping[str, Sequence[Any]],
     outer: Mapping[str, Sequence[Any]],
 ) -> Link:
-    """Return the comparison of two classes, whose `names` are (inner, outer), from their walks of the same episodes.
+    """Return the comparison of two classes with the `names` (inner, outer), from their walks of the same episodes.
 
     `inner` and `outer` have lists with an entry for each episode: `fell`, `speed_m_s`, and by each `Aim` its number,
     None where it could not be measured. Numbers are of the episodes that both classes walk to the end.

@@ -26,7 +26,7 @@ from ..feet.walked_speeds import TWO_PRICES
 FIBRE, ALL_EFFORT = TWO_PRICES
 """Fibre work, and all of the effort as energy: its part of work is fibre work [J/kg/m] each."""
 STRIDE_JOINTS = ("hip", "knee", "ankle")
-"""Joints whose power has a curve over the stride."""
+"""Joints with a curve of power over the stride."""
 _RIGHT = SIDES.index("right")
 
 EFFECT_NUMBERS = (

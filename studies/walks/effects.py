@@ -36,7 +36,7 @@ AROUND = (-0.15, 0.0, 0.15)
 0.13 m/s in one walk of twenty."""
 _RIGHT = "right"
 UNCLEAR = "unclear"
-"""Sign of an effect whose interval holds 0, or of a single episode, which has none."""
+"""Sign of an effect with 0 in its interval, or of a single episode, which has none."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -237,7 +237,7 @@ def _conditions_without_numbers(measured: Iterable[Measured], walks: Iterable[Se
 
 
 def _falls_text(walks: Sequence[Row]) -> str:
-    """Return the number of rows whose episode fell, as in "2 of 20"."""
+    """Return the number of rows with a fall, as in "2 of 20"."""
     return f"{sum(int(walk['falls']) for walk in walks)} of {len(walks)}"
 
 

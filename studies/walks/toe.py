@@ -222,7 +222,7 @@ def _csv_row(person: str, row: Row) -> dict[str, Any]:
 
 def verdict(compared: Sequence[Row], beside: Sequence[Row], speed: float) -> str:
     """Return a sentence with the changes by locked and absent toes at a walked `speed` [m/s], and with the number of
-    published effects whose sign is the same here.
+    published effects with the same sign here.
 
     `compared` are rows of `compared_rows`, `beside` of `beside_rows`.
     """

@@ -364,7 +364,7 @@ class _Run:
         unfinished.rename(checkpoint)
         for path in self._out.glob(f"{CHECKPOINT}*"):
             if path != checkpoint:
-                shutil.rmtree(path, ignore_errors=True)  # what is left costs no more than space
+                shutil.rmtree(path, ignore_errors=True)  # leftovers cost no more than space
         self._write_record("running")
 
     def _seconds(self) -> float:
