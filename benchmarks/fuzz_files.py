@@ -404,8 +404,7 @@ def _foot(path: Path) -> None:
 
 
 def _plan_file() -> bytes:
-    constants = {name: values for name, values in read_constants(CONSTANTS)["constants"].items() if "predicted" in name}
-    return json.dumps(read_object(STYLES, "styles") | {"constants": constants}).encode()
+    return json.dumps(read_object(STYLES, "styles")).encode()
 
 
 def _plan(path: Path) -> None:

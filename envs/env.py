@@ -226,7 +226,7 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
     | `cadence`                 | `"people"`      | steps of `"people"`, the `"thesis"`, or least `"effort"`           |
     | `guide`                   | `"people"`      | target of the walk: `"people"`, or its own `"plan"`                |
     | `people_file`             | `None`          | file of people's data in place of the package's, in its form       |
-    | `plan_file`               | `None`          | the plan's style (and tuned legs) in place of the package's        |
+    | `plan_file`               | `None`          | the plan's styles in place of the package's                        |
     | `human`                   | `None`          | someone's own walk in people's place: `read_gait(FILE).to_json()`  |
     | **springs**               |                 |                                                                    |
     | `equilibrium`             | `"planned"`     | `"planned"`, `"angle"`, `"neutral"` or `"phase"`                   |

@@ -1,8 +1,8 @@
 """Define the frozen tasks of the benchmark; `import springfoot` registers each with Gymnasium.
 
-Each task has two ids: `springfoot/Walk-v0`, where the action is the stiffness of ankles and toes and the committed
-person `learned` walks (in `FromThePlan` the tuned rest angles do), and `springfoot/WalkBoth-v0`, where the action also
-moves hips, knees and ankles. New settings, another person or other physics make a new version. Until springfoot 0.1.0
+Each task has two ids: `springfoot/Walk-v0`, where the action is the stiffness of ankles and toes and a committed person
+walks (`learned`; in `FromThePlan` `predicted`), and `springfoot/WalkBoth-v0`, where the action also moves hips, knees
+and ankles. New settings, another person or other physics make a new version. Until springfoot 0.1.0
 is released, v0 may change.
 """
 
@@ -12,6 +12,8 @@ VERSION = "v0"
 """Version of every task."""
 SECONDS = 10.0
 """Length of an episode [s]."""
+PLAN_RANGE_DEG = 20.0
+"""Largest offset of a rest angle on the plan [deg], where the legs begin at constants that nobody tuned."""
 HOW_IT_ACTS = ("action_mode", "aim_rate")
 """Settings that stay a policy's own on every task: how its action becomes a stiffness, how it holds a speed."""
 MUST_AGREE = (
@@ -59,10 +61,10 @@ def _tasks() -> dict[str, dict[str, Any]]:
     stiffness, both = {}, {}
     for name, settings in STIFFNESS_TASKS.items():
         given = {"episode_seconds": SECONDS, **settings}
-        # On the plan the tuned constants walk: the committed person learned on people's curves.
-        person = {} if settings.get("guide") == "plan" else {"person": "learned"}
-        stiffness[f"{name}-{VERSION}"] = {**person, **given}
-        both[f"{name}Both-{VERSION}"] = {"acts": "both", **given}
+        on_plan = settings.get("guide") == "plan"
+        farther = {"person_range_deg": PLAN_RANGE_DEG} if on_plan else {}
+        stiffness[f"{name}-{VERSION}"] = {"person": "predicted" if on_plan else "learned", **given}
+        both[f"{name}Both-{VERSION}"] = {"acts": "both", **farther, **given}
     return stiffness | both
 
 
@@ -87,5 +89,8 @@ FINGERPRINTS = {
 }
 """Task -> mean return of eight walks with small random actions [-], on the versions of constraints.txt
 (`springfoot.evaluation.benchmark.task_walks.task_fingerprint`)."""
-PERSON_SHA256 = "941daa201a21a8ab9d48eedc887a3a03b57ea9b199b17ea061c9735dae6d0f5f"
-"""Digest of the person `learned`, who walks on the v0 of every task that sets one."""
+PERSONS_SHA256 = {
+    "learned": "941daa201a21a8ab9d48eedc887a3a03b57ea9b199b17ea061c9735dae6d0f5f",
+    "predicted": "",
+}
+"""Person who walks on the v0 of the tasks -> digest of the file."""

@@ -17,11 +17,6 @@ MADE = {
         "`springfoot train --push-newton 250 --timesteps 500000 --out runs/medium`",
         "walk",
     ),
-    "predicted": (
-        "Walks by a plan that knows no person's curves.",
-        "`springfoot study predict`, while that trained a policy of stiffness",
-        "prediction",
-    ),
     **{
         name: (
             "Moves hips, knees and ankles too, on any foot, body, speed, step time and slope that it drew.",
@@ -29,8 +24,13 @@ MADE = {
             "feet",
         )
         for name in SHIPPED
-        if name in LEARNED
+        if name.startswith("learned")
     },
+    "predicted": (
+        "Walks by a plan that knows no person's curves; it moves hips, knees and ankles too, from untuned constants.",
+        "`springfoot train --preset predict --seed 1`, its last policy",
+        "prediction",
+    ),
 }
 """Policy -> purpose, the command that made it, and the page of its results."""
 SHARED_LIMITS = "One planar body in simulation; a stiffness that walks here is none for a patient's foot."

@@ -9,9 +9,8 @@ import numpy as np
 
 from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.batch.learned_person import digest_of_person
-from springfoot.envs.control.constants import LegConstants
 from springfoot.envs.control.equilibrium import foot_curves, foot_feed
-from springfoot.envs.control.legs import PLANNED_PLACE, leg_curves
+from springfoot.envs.control.legs import leg_curves
 from springfoot.envs.control.reference_walk import rows
 from springfoot.envs.control.stiffness_control import stiffness_of
 from springfoot.envs.settings.settings import TUNED
@@ -31,17 +30,15 @@ def fingerprint(biped: Biped) -> dict[str, str]:
     """Return the SHA-256 digests of all that a policy relies on: `observation`, `action`, compiled `model`, `legs`, and
     the file of a learned `person`.
 
-    `legs` digests the constants of hips, knees and foot springs, and the target curves, at every tabulated speed; the
-    planned position of the CoM counts only if the gain `swing_place_gain` reads it. Numbers count to six significant
-    digits, so that compilers and processors agree.
+    `legs` digests the constants of hips, knees and foot springs, and the target curves, at every tabulated speed.
+    Numbers count to six significant digits, so that compilers and processors agree.
     """
     model = biped.model
     actions = np.array([[-1.0, -1.0], [0.0, 0.0], [1.0, 1.0]])  # of ankle and toe: softest, middle, stiffest
     of_legs: list[Any] = []
     for constants, walk in rows(biped.walks):
-        columns = slice(None) if constants.swing_place_gain else slice(PLANNED_PLACE)  # from there the CoM's position
-        curves = (leg_curves(constants, walk)[:, columns], *foot_curves(biped.settings, constants, walk))
-        of_legs += [*_digested_constants(constants).values(), *(curve[::_EVERY] for curve in curves)]
+        curves = (leg_curves(constants, walk), *foot_curves(biped.settings, constants, walk))
+        of_legs += [*asdict(constants).values(), *(curve[::_EVERY] for curve in curves)]
         if (feed := foot_feed(biped.settings, constants, walk)) is not None:
             of_legs.append(feed[::_EVERY])
     person = biped.settings.walker
@@ -50,16 +47,8 @@ def fingerprint(biped: Biped) -> dict[str, str]:
         "observation": _digest(biped.observation_names, biped.observation_low, biped.observation_high),
         "action": _digest(biped.action_names, stiffness_of(actions, biped.settings, biped.body)),
         "model": _digest(_MODEL_NUMBERS, *(getattr(model, name) for name in _MODEL_NUMBERS), [model.opt.timestep]),
-        "legs": _digest(_digested_constants(biped.constants[0]), *of_legs),
+        "legs": _digest(asdict(biped.constants[0]), *of_legs),
     }
-
-
-def _digested_constants(legs: LegConstants) -> dict[str, Any]:
-    """Return name -> value of the leg constants that are digested: all, but no `swing_place_gain` of 0.
-
-    Policies trained before that constant existed have the digest without it, and still load.
-    """
-    return {name: value for name, value in asdict(legs).items() if value or name != "swing_place_gain"}
 
 
 def require_same(name: object, stored: Mapping[str, str], current: Mapping[str, str]) -> None:

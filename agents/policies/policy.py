@@ -54,7 +54,6 @@ _PRETRAINED = Path(str(resources.files("springfoot.agents"))) / "pretrained"
 SHIPPED = {
     "pretrained": _PRETRAINED / "walk.safetensors",
     "medium": _PRETRAINED / "medium.safetensors",
-    "predicted": _PRETRAINED / "predicted.safetensors",
     **{name: person_file(name) for name in LEARNED if name != "learned-1"},  # that one is `learned`
 }
 """Name of a policy of this package -> its file; `policy_card` describes each."""

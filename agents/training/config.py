@@ -18,7 +18,7 @@ from springfoot.errors import (
     require_count,
     require_number,
 )
-from springfoot.tasks import TASKS
+from springfoot.tasks import PLAN_RANGE_DEG, TASKS
 
 WIDEST, DEEPEST, MOST_WEIGHTS = 8192, 32, 2**21
 """Units of the widest hidden layer, number of hidden layers, and number of weights between them at most; chosen: a
@@ -208,7 +208,7 @@ PREDICTED = replace(
     stiffness_by="drawn",
     aim_rate=1.0,
     ankle_tendon=400.0,
-    person_range_deg=20.0,  # the constants that it begins at are generic: with them alone it falls within a second
+    person_range_deg=PLAN_RANGE_DEG,  # with the generic constants alone it falls within a second
     push_newton=100.0,
     speed_range=(0.75, 1.66),
     speed_interval=5.0,

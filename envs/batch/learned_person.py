@@ -25,7 +25,11 @@ PERSONS_FOLDER = Path(__file__).parent / "persons"
 """Folder of the persons that come with the package."""
 PERSON_SEEDS = (1, 2, 3, 4, 5)
 """Seeds of the trainings of the persons that come with the package, `springfoot train --preset person --seed SEED`."""
-LEARNED = {"learned": "learned-1"} | {name: name for name in (f"learned-{seed}" for seed in PERSON_SEEDS)}
+LEARNED = {
+    "learned": "learned-1",
+    **{name: name for name in (f"learned-{seed}" for seed in PERSON_SEEDS)},
+    "predicted": "predicted",
+}
 """Name of a person of this package -> its file in `PERSONS_FOLDER`, without suffix: the training's last policy."""
 POLICY_ENTRIES = frozenset({"format_version", "network", "settings", "fingerprint"})
 """Entries of a policy's header."""

@@ -6,14 +6,11 @@ from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, fields
 from functools import cache
 from importlib import resources
-from pathlib import Path
 from typing import Any, TypeVar, get_args, get_type_hints
 
 import numpy as np
 
 from springfoot.errors import SpringfootError, require_within
-from springfoot.files.json_file import MOST_JSON_BYTES
-from springfoot.files.text_table import read_bytes
 from springfoot.gait.plan.plan import PLAN_SPEED_RANGE
 
 TUNED_SPEED = 1.2
@@ -76,9 +73,6 @@ class LegConstants:
     """Fixed ankle stiffness in loading, early stance, late stance, push-off, swing [N m/rad]."""
     toe_schedule: float
     """Fixed toe stiffness [N m/rad]."""
-    swing_place_gain: float = 0.0
-    """Shift of the swing hip's target for each m that the CoM is farther ahead of the stance ankle than planned; 0
-    unless the body follows its plan [rad/m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,23 +92,15 @@ class SlopeConstants:
     """Added to the held trunk pitch."""
 
 
-def constants_name(
-    equilibrium: str, cadence: str, speed: float = TUNED_SPEED, feedforward: str = "people", follows_plan: bool = False
-) -> str:
+def constants_name(equilibrium: str, cadence: str, speed: float = TUNED_SPEED, feedforward: str = "people") -> str:
     """Return the name of the constants for these settings and `speed` [m/s at 1.70 m] in a file of constants.
 
-    The equilibria "angle" and "phase" share those of "planned"; a body that follows the plan has one set for all. The
-    cadence "effort" has those of people's.
+    The equilibria "angle" and "phase" share those of "planned". The cadence "effort" has those of people's.
     """
-    if follows_plan:
-        name = "predicted"
-    elif equilibrium == "neutral":
-        name = "neutral"
-    else:
-        name = "planned"
+    name = "neutral" if equilibrium == "neutral" else "planned"
     if cadence == "thesis":
         name += f", {cadence} cadence"
-    if feedforward != "people" and not follows_plan:  # the plan's moments are fed forward in any case
+    if feedforward != "people":
         name += f", {feedforward}'s moments"
     if speed != TUNED_SPEED:
         name += f", {speed:g} m/s"
@@ -122,27 +108,15 @@ def constants_name(
 
 
 def leg_constants(
-    equilibrium: str,
-    cadence: str,
-    speed: float = TUNED_SPEED,
-    feedforward: str = "people",
-    follows_plan: bool = False,
-    file: Path | None = None,
+    equilibrium: str, cadence: str, speed: float = TUNED_SPEED, feedforward: str = "people"
 ) -> LegConstants:
-    """Return the constants for a setting at `speed` [m/s at 1.70 m], the committed ones or those of `file`.
+    """Return the committed constants for a setting at `speed` [m/s at 1.70 m].
 
     Constants are linear in speed between the sets of the file; outside their speeds the nearest set holds. Raises
     `SpringfootError` for a setting without a set.
     """
-    name = constants_name(equilibrium, cadence, feedforward=feedforward, follows_plan=follows_plan)
-    if file is not None:
-        return constants_at(_sets_of(file, name), speed)
+    name = constants_name(equilibrium, cadence, feedforward=feedforward)
     table = _package_constants()
-    if follows_plan and name not in table:
-        raise SpringfootError(
-            f"there are no tuned leg constants for guide 'plan' and cadence {cadence!r}; "
-            "it must be 'people' or 'effort'"
-        )
     if name not in table:
         raise SpringfootError(
             f"there are no tuned leg constants for equilibrium {equilibrium!r}, cadence {cadence!r} and "
@@ -221,15 +195,6 @@ def _checked_number(name: str, value: Any) -> float:
     return require_within(name, value, (LEAST_STIFFNESS.get(name, -LARGEST_CONSTANT), LARGEST_CONSTANT))
 
 
-def _sets_of(file: Path, name: str) -> dict[float, LegConstants]:
-    """Return speed [m/s] -> the constants `name` in a file; raise `SpringfootError` if it does not have them."""
-    try:
-        return _sets(json.loads(read_bytes(file, MOST_JSON_BYTES))["constants"], name)
-    # All that reading other contents raises; RecursionError: nested too deeply.
-    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
-        raise SpringfootError(f"{file} has no leg constants {name!r}: {error}") from None
-
-
 def _package_constants() -> dict[str, dict]:
     """Return name (`constants_name`) -> leg constants of the package, in JSON form."""
     return _file()["constants"]
@@ -242,7 +207,7 @@ def _file() -> dict[str, dict]:
 
 
 def generic_constants() -> LegConstants:
-    """Return leg constants without tuning, at which searches begin, and learned persons that follow the plan.
+    """Return leg constants without tuning: searches begin at them, and so do persons who follow the plan.
 
     No curve is corrected, all moments are fed forward, springs are equally stiff at every phase, and the trunk is
     upright.

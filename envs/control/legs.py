@@ -28,10 +28,7 @@ from .subjects import Subjects
 
 STANCE_FALL = (0.5, 0.6)
 """Stride phases over which the trunk torque of a leg falls to zero as its stance ends; chosen, about double support."""
-FARTHEST = 0.1
-"""Error of the CoM's position over the stance foot [m at 1.70 m] at which the gains' input is clipped; chosen, as
-`stride_phase.SLOWEST`."""
-STANCE, HIP_STIFFNESS, KNEE_STIFFNESS, HIP_DRIVE, KNEE_DRIVE, PLANNED_SPEED, PLANNED_PLACE = range(7)
+STANCE, HIP_STIFFNESS, KNEE_STIFFNESS, HIP_DRIVE, KNEE_DRIVE, PLANNED_SPEED = range(6)
 """Columns of `leg_curves`, which explains them."""
 INCLINE_TRUNK = 3
 """Column of `slope_table` with the held trunk pitch; columns `HIP`, `KNEE` and `ANKLE` have those joints."""
@@ -83,8 +80,6 @@ def _compute_gains(constants, rows):
         gain.trunk_damping = scale.torque * scale.time * _between(low.trunk_damping, high.trunk_damping, weight)
         gain.speed_torque = scale.torque / scale.time * _between(low.speed_torque, high.speed_torque, weight)
         gain.swing_gain = _between(low.swing_gain, high.swing_gain, weight) / scale.time
-        gain.place_gain = _between(low.place_gain, high.place_gain, weight) / scale.length
-        gain.farthest = scale.length * _between(low.farthest, high.farthest, weight)
 
 
 @part
@@ -95,7 +90,7 @@ def drive(rows, bodies, control, table, incline) -> None:
         rows: (N,) of `CONTROL_ROW`.
         bodies: (N,) of `BODY_ROW`, as measured now.
         control: (N, side, joint, 2) for `envs.physics.simulation.Simulation.advance`, filled.
-        table: (R, SAMPLES, 2, 7) of `leg_curves`, of a `PhaseTable`.
+        table: (R, SAMPLES, 2, 6) of `leg_curves`, of a `PhaseTable`.
         incline: (1, SAMPLES, 2, 4) of `slope_table`.
     """
     curves = np.empty((2, table.shape[-1]))
@@ -119,10 +114,7 @@ def drive(rows, bodies, control, table, incline) -> None:
             stance = curves[side, STANCE]
             hip = torque * curves[side, HIP_STIFFNESS]
             knee = torque * curves[side, KNEE_STIFFNESS]
-            # By how much the CoM is farther ahead of the other leg's ankle than planned.
-            ahead = m.com[0] - m.ankle[1 - side, 0] - subject.scale.length * curves[side, PLANNED_PLACE]
-            shift = gain.swing_gain * too_fast + gain.place_gain * min(max(ahead, -gain.farthest), gain.farthest)
-            feedback = stance * stance_torque + (1.0 - stance) * hip * shift
+            feedback = stance * stance_torque + (1.0 - stance) * hip * (gain.swing_gain * too_fast)
             control[i, side, HIP, 0] = hip
             control[i, side, HIP, 1] = torque * curves[side, HIP_DRIVE] + feedback + hip * offset[side, HIP]
             control[i, side, KNEE, 0] = knee
@@ -175,18 +167,15 @@ def _gains(constants: LegConstants, walk: ReferenceWalk) -> tuple[float, ...]:
         constants.trunk_damping * scale * time_scale,
         constants.speed_torque * scale / time_scale,
         constants.swing_speed_gain / time_scale,  # swing_gain
-        constants.swing_place_gain / body.length_scale,  # place_gain
-        FARTHEST * body.length_scale,
     )
 
 
 def leg_curves(constants: LegConstants, walk: ReferenceWalk) -> NDArray:
-    """Return the curves over the stride by which the controller moves one leg's hip and knee, (SAMPLES, 7).
+    """Return the curves over the stride by which the controller moves one leg's hip and knee, (SAMPLES, 6).
 
-    Columns, from `STANCE` to `PLANNED_PLACE`: fraction of the stance leg's gains in effect, from 0 in swing to 1 in
+    Columns, from `STANCE` to `PLANNED_SPEED`: fraction of the stance leg's gains in effect, from 0 in swing to 1 in
     stance; hip and knee stiffness K [N m/rad]; hip and knee drive torque [N m], K times the rest angle plus the
-    fed-forward moment; the planned CoM's forward speed over its mean; the planned distance of the CoM ahead of the
-    other leg's ankle [m].
+    fed-forward moment; the planned CoM's forward speed over its mean.
     """
     body = walk.body
     target = walk.target
@@ -210,6 +199,4 @@ def leg_curves(constants: LegConstants, walk: ReferenceWalk) -> NDArray:
         drives.append(stiffness * rest + fed_forward)
     # The plan's phase is that of its step, of which a stride has two.
     planned_speed = walk.plan.com_velocity(2 * GRID % 1.0)[0] / walk.speed
-    # The plan's x is from the stance ankle: in this leg's stance the other ankle is left a step length behind it.
-    planned_place = walk.plan.com(2 * GRID % 1.0)[0] + np.where(GRID < 0.5, walk.plan.step_length, 0.0)
-    return np.stack([*columns, *drives, planned_speed, planned_place], axis=-1)
+    return np.stack([*columns, *drives, planned_speed], axis=-1)

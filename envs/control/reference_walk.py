@@ -111,13 +111,12 @@ def reference_walk_at(
 def _constants(settings: BipedSettings, speed: float) -> list[LegConstants]:
     """Return the constants for the settings' body at `speed` [m/s], one variant.
 
-    They are the tuned ones, but a learned person that follows the plan begins at generic ones.
+    They are tuned to people's walk, and generic for a body that follows the plan.
     """
-    if settings.follows_plan and settings.has_learned_legs:
+    if settings.follows_plan:
         return [generic_constants()]
     equal_speed = speed / sqrt(body_of(settings).length_scale)  # of a body of 1.70 m
-    named_by = settings.equilibrium, settings.cadence, equal_speed, settings.feedforward, settings.follows_plan
-    return [leg_constants(*named_by, plan_file_of(settings))]
+    return [leg_constants(settings.equilibrium, settings.cadence, equal_speed, settings.feedforward)]
 
 
 def _moments_of(gait: HumanGait, body: Body) -> NDArray:

@@ -93,8 +93,6 @@ GAINS = np.dtype(
         ("trunk_damping", float),  # [N m s/rad]
         ("speed_torque", float),  # [N s]
         ("swing_gain", float),  # [rad s/m]
-        ("place_gain", float),  # [rad/m]
-        ("farthest", float),  # [m]
     ]
 )
 """Constants of one body's legs, scaled to it."""

@@ -87,8 +87,8 @@ FASTEST_AIM = 5.0
 TENDON_RANGE = (100.0, 2000.0)
 """Stiffness of a tendon that the setting `ankle_tendon` takes [N m/rad]; chosen: a fourth and five times people's."""
 TUNED = "tuned"
-"""Name of the person who is no network: the rest angles of the leg constants alone."""
-OWN_PERSON: dict[Guide, str] = {"people": TUNED, "plan": TUNED}
+"""Name of the person who is no network: the rest angles of the leg constants alone, tuned to people's walk."""
+OWN_PERSON: dict[Guide, str] = {"people": TUNED, "plan": "predicted"}
 """Guide -> its own person, who walks where the setting `person` is None."""
 DEFAULT_WEIGHTS = {
     "alive": 0.15,
@@ -181,8 +181,7 @@ class BipedSettings:
     people_file: str | None = field(default=None, metadata=_REFERENCE)
     """File of people's data in place of `human_harmonics.json` of `springfoot.gait`, in the same form."""
     plan_file: str | None = field(default=None, metadata=_REFERENCE)
-    """With guide `plan`: file of the plan's style (`springfoot study predict`) and of the constants of tuned legs, not
-    the package's."""
+    """With guide `plan`: file of the plan's styles (`springfoot study predict`), not the package's."""
     equilibrium: Equilibrium = field(default="planned", metadata=_SPRINGS)
     """Rest angle of ankle and toe: the target's ankle angle with the moment of `feedforward` fed forward (planned),
     that angle alone, constant (neutral), or constant in each phase of `schedule` (phase)."""
@@ -211,9 +210,10 @@ class BipedSettings:
     """What the action sets: the stiffness of ankles and toes; the person, that is, offsets to the rest angles of hips,
     knees and ankles, every 20 ms; or both (`springfoot.envs.control.person_actions`)."""
     person: str | None = field(default=None, metadata=_PERSON)
-    """Who walks where the action sets stiffness alone: by default the guide's own, of both guides the tuned rest angles
-    (tuned); a person of the package, who has learned other feet, bodies and slopes (learned, learned-2 to learned-5);
-    or another one who learned on the same guide, a policy file of `springfoot train --preset person`, or `predict`."""
+    """Who walks where the action sets stiffness alone: by default the guide's own, the tuned rest angles (tuned) or
+    the person who learned on the plan (predicted); one who has learned other feet, bodies and slopes (learned,
+    learned-2 to learned-5); or another one who learned on the same guide, a policy file of `springfoot train --preset
+    person`, or `predict`. On the plan nothing is tuned, so that `tuned` falls there."""
     person_range_deg: float = field(default=14.0, metadata=_PERSON)
     """Largest offset of a rest angle, that of an action of 1 [0..30 deg]."""
     aim_rate: float = field(default=0.0, metadata=_PERSON)
@@ -320,11 +320,6 @@ class BipedSettings:
     def follows_plan(self) -> bool:
         """Return True with guide `plan`: the target is then the plan's own gait, else that of people."""
         return self.guide == "plan"
-
-    @property
-    def has_learned_legs(self) -> bool:
-        """Return True if a network moves the rest angles of the legs: a learned person, or the policy itself."""
-        return self.acts != "stiffness" or self.walker != TUNED
 
     @property
     def walker(self) -> str:

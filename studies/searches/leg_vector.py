@@ -32,12 +32,10 @@ class Search:
     """Vectors of a search, in unit steps from its start, and the leg constants that they stand for.
 
     The last three entries of a vector lead whole target curves (`LED`). `names` (size,) has the constant of each entry.
-    There is none for `swing_place_gain`, which only bodies that follow their plan use.
     """
 
     def __init__(self, start: LegConstants, speed: float = TUNED_SPEED, target: HumanGait | None = None):
-        varied = {name: value for name, value in asdict(start).items() if name != "swing_place_gain"}
-        self._start = {name: np.atleast_1d(np.array(value, float)) for name, value in varied.items()}
+        self._start = {name: np.atleast_1d(np.array(value, float)) for name, value in asdict(start).items()}
         target = target or human_gait(speed)
         # Change of the knots [deg] that shifts a target curve by one `LEAD_STEP`: the step times the curve's rate.
         self._lead = {name: LEAD_STEP * np.rad2deg(target.rate(curve, KNOTS)) for name, curve in LED.items()}

@@ -7,7 +7,7 @@ from gymnasium.utils.env_checker import check_env
 from springfoot.envs.batch.learned_person import digest_of_person
 from springfoot.envs.settings.settings import settings_from, settings_to_json
 from springfoot.evaluation.benchmark.task_walks import task_fingerprint
-from springfoot.tasks import FINGERPRINTS, PERSON_SHA256, STIFFNESS_TASKS, TASKS
+from springfoot.tasks import FINGERPRINTS, PERSONS_SHA256, STIFFNESS_TASKS, TASKS
 
 
 @pytest.mark.parametrize("task", TASKS)
@@ -33,8 +33,9 @@ def test_no_task_has_moved(task):
     assert task_fingerprint(task) == pytest.approx(FINGERPRINTS[task], rel=1e-6)
 
 
-def test_the_person_of_the_tasks_is_pinned():
-    assert digest_of_person("learned") == PERSON_SHA256
+def test_the_persons_of_the_tasks_are_pinned():
+    assert {settings["person"] for settings in TASKS.values() if "person" in settings} == set(PERSONS_SHA256)
+    assert {name: digest_of_person(name) for name in PERSONS_SHA256} == PERSONS_SHA256
 
 
 def test_a_task_s_settings_are_plain_and_complete():

@@ -2,7 +2,7 @@
 
 import json
 import re
-from dataclasses import replace
+from dataclasses import asdict
 from importlib import resources
 
 import numpy as np
@@ -17,7 +17,6 @@ from springfoot.envs.control.legs import knot_curve
 from springfoot.envs.control.phase_table import GRID
 from springfoot.envs.control.reference_walk import reference_walk_at
 from springfoot.envs.control.stiffness_control import action_of
-from springfoot.envs.physics.model import HIP, LEFT, RIGHT
 from springfoot.envs.settings.settings import BipedSettings
 from springfoot.errors import SpringfootError
 
@@ -78,15 +77,10 @@ def test_a_setting_without_constants_is_refused():
         ("unknown", 1.0, "constants must be a dictionary with hip_knots_deg"),
     ],
 )
-def test_constants_of_a_file_that_cannot_be_are_refused_in_one_line(tmp_path, name, value, said):
-    table = json.loads(resources.files("springfoot.envs.control").joinpath("legs.json").read_text(encoding="utf-8"))
-    for speed in ("", ", 0.9 m/s"):  # another speed's are read too
-        constants = {key: values for key, values in table["constants"].items() if key.startswith("predicted")}
-        constants[f"predicted{speed}"] = constants[f"predicted{speed}"] | {name: value}
-        path = tmp_path / "plan.json"
-        path.write_text(json.dumps({"constants": constants}), encoding="utf-8")
-        with pytest.raises(SpringfootError, match=re.escape(f"plan.json has no leg constants 'predicted': {said}")):
-            leg_constants("planned", "people", 1.2, follows_plan=True, file=path)
+def test_constants_that_cannot_be_are_refused_in_one_line(name, value, said):
+    values = asdict(leg_constants("planned", "people")) | {name: value}
+    with pytest.raises(SpringfootError, match=f"^{re.escape(said)}"):
+        constants_from(values)
 
 
 def test_knots_are_met_and_periodic():
@@ -117,21 +111,6 @@ def test_plateaus_are_flat():
     for value, start, end in zip((10, 20, 30, 40, 50), PLATEAUS[::2], PLATEAUS[1::2], strict=True):
         inside = (start <= GRID) & (end >= GRID)
         np.testing.assert_allclose(curve[inside], value)
-
-
-def test_the_swing_hip_turns_with_the_coms_place_over_the_stance_foot():
-    own = leg_constants("planned", "people", follows_plan=True)
-    variants = [replace(own, swing_place_gain=gain) for gain in (0.0, 0.8)]
-    biped = Biped(BipedSettings(guide="plan", height=1.9, mass=80.0), 2, legs=variants, variant=np.arange(2))
-    biped.reset(np.arange(2), [3, 3], start=0.25)  # the left foot in mid-stance
-    ticks, measured = [], biped.measurement
-    ahead = measured.com[0, 0] - measured.ankle[0, LEFT, 0] - float(biped.plan.com(0.5)[0])
-    biped.on_tick = ticks.append
-    biped.step(np.zeros((2, 4)))
-    turned = np.diff(ticks[0].equilibrium[:, :, HIP], axis=0)[0]
-    assert abs(ahead) > 0.001
-    assert turned[RIGHT] == pytest.approx(0.8 / (1.9 / 1.7) * ahead, rel=1e-3)
-    assert turned[LEFT] == 0.0
 
 
 def test_a_slope_moves_the_legs_on_it_and_no_bit_beside_it():

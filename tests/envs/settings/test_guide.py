@@ -8,8 +8,7 @@ import pytest
 from benchmarks.scrambled import scrambled
 from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.control import generic_constants
-from springfoot.envs.control.constants import constants_name, leg_constants
-from springfoot.envs.settings.settings import BipedSettings, settings_from
+from springfoot.envs.settings.settings import settings_from
 from springfoot.gait import SpringfootError
 
 PLAN = {"guide": "plan"}
@@ -59,7 +58,7 @@ def test_the_plans_moment_stands_beside_the_springs_whatever_their_stiffness():
             assert moment[side, joint] == pytest.approx(fed, abs=0.05 * np.abs(moment).max()), (side, name)
 
 
-def test_with_the_fixed_schedule_it_walks():
+def test_its_own_person_walks_with_the_fixed_schedule():
     settings = settings_from(**PLAN, action_mode="residual")
     biped = Biped(settings, 4)
     biped.reset(np.arange(4), [10, 11, 12, 13])
@@ -70,10 +69,9 @@ def test_with_the_fixed_schedule_it_walks():
     assert biped.measurement.com[:, 0] / 6.0 == pytest.approx(1.2, abs=0.15)
 
 
-def test_learned_legs_begin_at_constants_that_nobody_tuned():
-    tuned = leg_constants("planned", "people", follows_plan=True)
-    for acts, constants in (("stiffness", tuned), ("person", generic_constants()), ("both", generic_constants())):
-        assert Biped(settings_from(**PLAN, acts=acts), 1).constants == (constants,)
+def test_legs_begin_at_constants_that_nobody_tuned():
+    for acts in ("stiffness", "person", "both"):
+        assert Biped(settings_from(**PLAN, acts=acts), 1).constants == (generic_constants(),)
 
 
 def test_settings_that_need_people_are_refused():
@@ -81,9 +79,5 @@ def test_settings_that_need_people_are_refused():
     own |= {"mean": {}, "sd": {}}
     with pytest.raises(SpringfootError, match="human must be None with guide 'plan': the plan replaces human data"):
         settings_from(**PLAN, human=own)
-    with pytest.raises(SpringfootError, match="there are no tuned leg constants for guide 'plan' and cadence 'thesis'"):
-        Biped(BipedSettings(guide="plan", cadence="thesis"), 1)
     with pytest.raises(SpringfootError, match="guide must be"):
         settings_from(guide="nobody")
-    angle, neutral = (constants_name(name, "people", follows_plan=True) for name in ("angle", "neutral"))
-    assert angle == neutral

@@ -57,14 +57,13 @@ def test_settings_hold_their_own_copy_of_what_was_given():
 
 
 def test_the_guides_own_person_walks_by_default():
-    for guide in ("people", "plan"):
+    for guide, own in (("people", TUNED), ("plan", "predicted")):
         settings = BipedSettings(guide=guide)
-        assert settings.person is None and settings.walker == TUNED and not settings.has_learned_legs
-        assert BipedSettings(guide=guide, person=TUNED) == settings
+        assert settings.person is None and settings.walker == own
+        assert BipedSettings(guide=guide, person=own) == settings
     learned = BipedSettings(person="learned")
-    assert learned.walker == learned.person == "learned" and learned.has_learned_legs
-    both = BipedSettings(acts="both", person=TUNED)
-    assert both.walker == TUNED and both.has_learned_legs
+    assert learned.walker == learned.person == "learned"
+    assert BipedSettings(acts="both", person=TUNED).walker == BipedSettings(acts="both", guide="plan").walker == TUNED
 
 
 def test_feet_schedule_and_human_are_objects_whether_given_plain_or_as_objects():

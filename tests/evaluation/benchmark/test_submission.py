@@ -35,13 +35,13 @@ TASK = "Walk-v0"
 
 @pytest.fixture(scope="module")
 def submitted(tmp_path_factory):
-    """A submission of a policy's file, so soft that the tuned legs soon fall, and a committed one of springs."""
+    """A submission of a policy's file, whose actions make it fall soon, and a committed one of springs."""
     folder = tmp_path_factory.mktemp("submissions")
     policy = read_policy("predicted")
     soft = replace(policy, biases=(*policy.biases[:-1], np.full_like(policy.biases[-1], -100.0)))
     save_policy(folder / "soft.safetensors", soft)
     return [
-        benchmark.submit(str(folder / "soft.safetensors"), "FromThePlan-v0", "ours", folder / "ours", threads=1),
+        benchmark.submit(str(folder / "soft.safetensors"), "FromThePlanBoth-v0", "ours", folder / "ours", threads=1),
         benchmark.read_submission(REPOSITORY / "benchmarks" / "submissions" / TASK / "constant"),
     ]
 

@@ -58,5 +58,5 @@ def test_quick_runs(tmp_path):
 
 
 def test_a_policy_that_moves_no_person_is_refused(capsys):
-    assert study_main(["foot-map", "predicted", "--quick"]) == 2
-    assert "predicted moves no person" in capsys.readouterr().err
+    assert study_main(["foot-map", "pretrained", "--quick"]) == 2
+    assert "pretrained moves no person" in capsys.readouterr().err

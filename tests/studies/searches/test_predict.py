@@ -1,7 +1,6 @@
 """A walk from nothing by one command: its stages and their seconds, its table, the file of its plan."""
 
 import json
-from dataclasses import asdict
 
 import cma
 import numpy as np
@@ -9,7 +8,6 @@ import pytest
 
 from springfoot.agents.policies.policy import read_policy
 from springfoot.cli.main import study_main
-from springfoot.envs.control.constants import leg_constants
 from springfoot.envs.settings.settings import BipedSettings, settings_from
 from springfoot.gait import SpringfootError
 from springfoot.gait.plan.walk_style import STYLES
@@ -108,8 +106,7 @@ def test_the_table_has_people_in_range_and_bold_where_a_walk_is_not():
 
 def test_a_plan_file_takes_the_place_of_the_packages_own_and_another_kind_is_refused(tmp_path):
     path, styles = tmp_path / "found.json", json.loads(STYLES.read_text(encoding="utf-8"))["styles"]
-    sets = {"predicted": asdict(leg_constants("planned", "people", follows_plan=True))}
-    path.write_text(json.dumps({"styles": styles, "constants": sets}), encoding="utf-8")
+    path.write_text(json.dumps({"styles": styles}), encoding="utf-8")
     own, given = (plan_numbers(settings_from(guide="plan", plan_file=file)) for file in (None, str(path)))
     assert own == given
     for values, said in (
