@@ -215,7 +215,7 @@ PREDICTED = replace(
     slope_range_deg=(-5.0, 5.0),
     unevenness_m=0.01,
     reward_weights={
-        "alive": 135.0,  # about what all prices take at first: with less it learns to fall
+        "alive": 180.0,  # about what all prices take at first: with less it learns to fall
         "speed": 10.0,
         "com_x": 10.0,
         "com_z": 6.0,
@@ -229,7 +229,7 @@ PREDICTED = replace(
         "acceleration": -12.0,
         "impact": -6.0,
         "speed_held": -120.0,
-        "step_length": -45.0,  # without it steps come out an eighth longer than planned
+        "step_length": -200.0,  # at -45 steps still come out an eighth longer than planned
         "person_rate": -0.3,
     },
 )

@@ -33,7 +33,7 @@ from .prediction_table import people_numbers, plan_numbers, prediction_table, wa
 
 FOUND = "styles.json"
 """File with the styles of the plans, a `plan_file` of the settings."""
-PLAN_SPEEDS: dict[float, float | None] = {1.2: None, 1.05: 1.2, 0.9: 1.05, 1.35: 1.2, 1.5: 1.35}
+PLAN_SPEEDS: dict[float, float | None] = {1.2: None, 1.05: 1.2, 0.9: 1.05, 1.35: 1.2, 1.5: 1.35, 1.65: 1.5}
 """Speed of a plan [m/s] -> the one at whose style its search begins; None: at round numbers. Chosen: with one style for
 all speeds a walk changes with speed otherwise than people's."""
 NEXT_SPREAD = 0.2
