@@ -28,7 +28,7 @@ MADE = {
     },
     "predicted": (
         "Walks by a plan that knows no person's curves; it moves hips, knees and ankles too, from untuned constants.",
-        "`springfoot train --preset predict --seed 3`, its last policy",
+        "`springfoot train --preset predict --seed 1`, its last policy",
         "prediction",
     ),
 }

@@ -55,8 +55,10 @@ class Predict(WalkingStudy):
     timesteps: int = PRESETS["predict"].timesteps
     """Steps of the training of the person (preset `predict`)."""
     search_seed: int = 3
-    """Seed of the search for the first plan, of 0 to 4 the one that ends at the least effort, and of the training; the
-    other searches, which begin at a style, have seed 0."""
+    """Seed of the search for the first plan, of 0 to 4 the one that ends at the least effort; the other searches, which
+    begin at a style, have seed 0."""
+    training_seed: int = 1
+    """Seed of the training."""
 
     QUICK: ClassVar[dict[str, Any]] = {
         **WalkingStudy.QUICK,
@@ -73,7 +75,8 @@ class Predict(WalkingStudy):
         for name in ("plan_generations", "next_generations", "timesteps"):
             require_count(name, getattr(self, name))
         require_count("population", self.population, 4)
-        require_count("search_seed", self.search_seed, 0, 2**31 - 2)
+        for name in ("search_seed", "training_seed"):
+            require_count(name, getattr(self, name), 0, 2**31 - 2)
 
     @property
     def total(self) -> float:
@@ -115,7 +118,7 @@ class Predict(WalkingStudy):
         return replace(
             preset,
             timesteps=self.timesteps,
-            seed=self.search_seed,
+            seed=self.training_seed,
             threads=self.threads,
             environment=replace(preset.environment, plan_file=str(self.folder / FOUND)),
         )
