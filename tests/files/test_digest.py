@@ -10,7 +10,6 @@ import pytest
 
 from springfoot.agents.policies.schedule_files import schedule_file
 from springfoot.envs import BipedSettings
-from springfoot.envs.control.constants import leg_constants
 from springfoot.evaluation.recording.policies import policy_and_settings
 from springfoot.evaluation.recording.recording import load_recording, record
 from springfoot.evaluation.report.schedule_tables import write_schedules
@@ -124,7 +123,7 @@ def test_gigabytes_are_refused_unread(tmp_path, name, read, most):
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss < before + 50_000  # kB
 
 
-@pytest.mark.parametrize("read", [harmonics, styles_of, lambda path: leg_constants("planned", "fixed", file=path)])
+@pytest.mark.parametrize("read", [harmonics, styles_of])
 def test_gigabytes_in_place_of_data_of_the_package_are_refused_unread(tmp_path, read):
     path = sparse(tmp_path / "a.json", GIGABYTES)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

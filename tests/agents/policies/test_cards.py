@@ -6,7 +6,7 @@ import pytest
 
 from springfoot.agents import policy_card, read_policy
 from springfoot.agents.policies import SHIPPED, find_policy
-from springfoot.envs.batch.learned_person import PERSONS_FOLDER
+from springfoot.envs.batch.learned_person import LEARNED, PERSONS_FOLDER
 from springfoot.errors import SpringfootError
 
 
@@ -21,12 +21,12 @@ def test_each_loads_by_name_and_has_a_card(name):
     card = policy_card(name)
     assert card.startswith(f"**{name}.** ") and sha256(find_policy(name).read_bytes()).hexdigest() in card
     layers = "83 - 256 - 256 - 5, tanh, for each leg, the right one's mirrored"
-    assert f"network: {layers if name.startswith('learned') else f'43 - 64 - 64 - 4, {policy.activation}'}; " in card
+    assert f"network: {layers if name in LEARNED else f'43 - 64 - 64 - 4, {policy.activation}'}; " in card
 
 
 def test_another_name_has_no_card():
     with pytest.raises(
         SpringfootError,
-        match=r"no policy 'mine' in the package; there are pretrained, .*, learned, learned-2, .*, learned-5$",
+        match=r"no policy 'mine' in the package; there are pretrained, .*, learned, .*, learned-5, predicted$",
     ):
         policy_card("mine")

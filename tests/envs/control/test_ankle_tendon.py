@@ -75,10 +75,10 @@ def test_a_tendon_that_is_stiff_enough_changes_nothing():
 def test_fed_moments_give_the_same_torque_at_the_planned_angle_whatever_bounds_k():
     ticks = []
     for tendon in (None, 150.0):
-        biped = Biped(settings_from(guide="plan", ankle_tendon=tendon, start=0.45), 1)
+        biped = Biped(settings_from(guide="plan", person="tuned", ankle_tendon=tendon, start=0.45), 1)
         biped.on_tick = ticks.append
         biped.reset(np.array([0]), [0])
-        biped.step(np.full((1, 4), 0.5))
+        biped.step(np.ones((1, 4)))
     free, bound = ticks[0], ticks[2]  # the first window of each, from the same state
     stiffness, equilibrium = (
         np.array([getattr(tick, name)[0, 0, ANKLE] for tick in (free, bound)]) for name in ("stiffness", "equilibrium")

@@ -58,9 +58,9 @@ def test_settings_hold_their_own_copy_of_what_was_given():
 
 def test_the_guides_own_person_walks_by_default():
     for guide, own in (("people", TUNED), ("plan", "predicted")):
-        settings = BipedSettings(guide=guide)
+        settings = settings_from(guide=guide)
         assert settings.person is None and settings.walker == own
-        assert BipedSettings(guide=guide, person=own) == settings
+        assert settings_from(guide=guide, person=own) == settings
     learned = BipedSettings(person="learned")
     assert learned.walker == learned.person == "learned"
     assert BipedSettings(acts="both", person=TUNED).walker == BipedSettings(acts="both", guide="plan").walker == TUNED

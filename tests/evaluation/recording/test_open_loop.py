@@ -207,8 +207,8 @@ ERRORS = [
     (
         "frozen:nobody",
         "no policy 'nobody': give a .safetensors or .onnx file, a run folder, a schedule in a .csv or .json file, "
-        "module:function, frozen:POLICY, or one of pretrained, medium, predicted, learned, learned-2, learned-3, "
-        "learned-4, learned-5, "
+        "module:function, frozen:POLICY, or one of pretrained, medium, learned, learned-2, learned-3, "
+        "learned-4, learned-5, predicted, "
         f"{', '.join(BASELINES)}",
     ),
 ]

@@ -78,7 +78,9 @@ def test_effort_counts_energy_and_joints_beyond_their_range():
 def test_styles_are_linear_between_speeds_and_their_json_is_exact():
     style = least_work(1.2)
     assert style_from(style.to_json()) == style
-    assert least_work(0.5) == least_work(1.0) == style  # one speed is committed
+    assert least_work(0.5) == least_work(0.9) and least_work(1.8) == least_work(1.65)  # the nearest
+    between = [least_work(speed).zmp_travel[1] for speed in (1.2, 1.25, 1.35)]
+    assert between[1] == pytest.approx(between[0] + (between[2] - between[0]) / 3)
 
 
 def test_no_small_step_from_the_committed_style_costs_much_less():
