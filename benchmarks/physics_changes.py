@@ -60,7 +60,6 @@ ROWS: dict[str, Edit] = {
     "solver tolerance 1e-5": _option(tolerance=1e-5),
     "integrator implicit": _option(integrator=int(_INTEGRATOR.mjINT_IMPLICIT)),
     "integrator Euler": _option(integrator=int(_INTEGRATOR.mjINT_EULER)),
-    "integrator RK4": _option(integrator=int(_INTEGRATOR.mjINT_RK4)),
     "mid-phase collision": _flag(_DISABLE.mjDSBL_MIDPHASE, False),
     "no joint stops": _flag(_DISABLE.mjDSBL_LIMIT, True),
     "no force sensors": _flag(_DISABLE.mjDSBL_SENSOR, True),
