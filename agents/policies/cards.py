@@ -35,8 +35,8 @@ MADE = {
 """Policy -> purpose, the command that made it, and the page of its results."""
 SHARED_LIMITS = "One planar body in simulation; a stiffness that walks here is none for a patient's foot."
 """Limits of every policy that comes with the package."""
-ONE_BODY = " Slopes, loads and other bodies were not trained: measure them first (`springfoot study compare --world`)."
-"""Further limits of those that were trained on one body."""
+ONE_BODY = " {} and other bodies were not trained: measure them first (`springfoot study compare --world`)."
+"""Further limits of those that were trained on one body, the untrained ground and load in the braces."""
 ACTED_ON = {
     "stiffness": "four stiffnesses",
     "person": "six rest angles",
@@ -64,12 +64,14 @@ def policy_card(name: str) -> str:
     layers = " - ".join(map(str, policy.layer_sizes))
     differences = ", ".join(f"{key} {_in_short(value)}" for key, value in changed.items())
     legs = ", for each leg, the right one's mirrored" if policy.mirror is not None else ""
+    level = policy.settings.slope_range_deg == BipedSettings().slope_range_deg
+    further = "" if policy.settings.drawn_bodies else ONE_BODY.format("Slopes, loads" if level else "Loads")
     lines = [
         f"made by: {command}",
         f"results and falls: docs/results/{page}.md",
         f"network: {layers}, {policy.activation}{legs}; observations to {ACTED_ON[policy.settings.acts]}",
         f"settings of its training, where not the defaults: {differences or 'none'}",
-        f"limits: {SHARED_LIMITS}{'' if policy.settings.drawn_bodies else ONE_BODY}",
+        f"limits: {SHARED_LIMITS}{further}",
         f"SHA-256: `{sha256(read_bytes(find_policy(name))).hexdigest()}`",
     ]
     return "\n- ".join([f"**{name}.** {purpose}\n", *lines])

@@ -22,6 +22,7 @@ def test_each_loads_by_name_and_has_a_card(name):
     assert card.startswith(f"**{name}.** ") and sha256(find_policy(name).read_bytes()).hexdigest() in card
     layers = "83 - 256 - 256 - 5, tanh, for each leg, the right one's mirrored"
     assert f"network: {layers if name in LEARNED else f'43 - 64 - 64 - 4, {policy.activation}'}; " in card
+    assert ("Slopes, loads and other bodies were not trained" in card) == (policy.settings.slope_range_deg is None)
 
 
 def test_another_name_has_no_card():
