@@ -233,9 +233,9 @@ PREDICTED = replace(
         "person_rate": -0.3,
     },
 )
-"""Task of a person that follows the plan, and begins at generic constants. The reward pays for CoM and ZMP of the plan
-and a held speed, and charges the muscles' energy above all, activation and its rate, accelerations and impact; angles
-and forces do not count."""
+"""Task of a person that follows the plan, and begins at generic constants. The reward pays for CoM and ZMP of the plan,
+and charges for speed and steps other than planned and for the muscles: their energy above all, activation and its rate,
+accelerations and impact. Angles and forces do not count."""
 
 _PERSON = TrainingConfig(
     timesteps=7_680_000,

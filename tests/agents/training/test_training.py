@@ -90,7 +90,8 @@ def test_the_reward_of_predict_reads_no_likeness():
     task = PRESETS["predict"].environment
     weights = DEFAULT_WEIGHTS | task.reward_weights
     assert task.follows_plan and weights["pose"] == weights["grf"] == 0.0
-    assert all(weights[name] < 0.0 for name in ("fibre_work", "activation", "acceleration", "impact", "speed_held"))
+    costs = "fibre_work", "activation", "activation_rate", "acceleration", "impact", "speed_held", "step_length"
+    assert all(weights[name] < 0.0 for name in costs)
 
 
 def test_a_configuration_without_a_form_is_not_mirrored():

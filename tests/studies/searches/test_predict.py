@@ -42,6 +42,7 @@ def test_all_stages_run_and_a_second_time_nothing_is_done_again(tmp_path, monkey
     styles = json.loads((runs / "styles.json").read_text(encoding="utf-8"))["styles"]
     assert sorted(map(float, styles)) == sorted(PLAN_SPEEDS)
     assert len({str(one) for one in styles.values()}) > 1  # one generation may find nothing better than its start
+    assert {path.stem for path in runs.glob("plan-*.json")} == {f"plan-{speed:g}" for speed in PLAN_SPEEDS}
     assert settings.follows_plan and settings.plan_file == "runs-quick/styles.json"
     capsys.readouterr()
     assert study_main(["predict", "--quick", "--runs", "runs", "--search-seed", "1"]) == 2
