@@ -9,7 +9,7 @@ from springfoot.envs import BipedSettings
 from springfoot.envs.settings import FOOT_SETTINGS
 from springfoot.evaluation.recording import Recording, policy_and_settings, record_feet
 
-from .kept import Kept
+from .kept import Kept, known_as
 from .study import OnProgress, WalkingStudy
 
 
@@ -34,11 +34,12 @@ class ConditionWalks:
         A condition is settings that differ from the usual. Walks in `kept` are not walked again; conditions that differ
         in feet alone are walked side by side.
         """
+        known = known_as(policy)
         numbers: dict[str, dict[str, Any]] = {}
         for but_feet in {str(without_feet(condition)): without_feet(condition) for condition in conditions}.values():
             alike = [condition for condition in conditions if without_feet(condition) == but_feet]
             questions = [
-                [{**self.study.walked, "seconds": self.study.seconds}, policy, condition, self.names]
+                [{**self.study.walked, "seconds": self.study.seconds}, known, condition, self.names]
                 for condition in alike
             ]
 

@@ -5,8 +5,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from springfoot.agents.policies import find_policy
 from springfoot.errors import SpringfootError
 from springfoot.files.json_file import read_object
+from springfoot.files.tensor_file import digest_of_file
 from springfoot.files.writing import write_atomically
 
 
@@ -44,3 +46,12 @@ class Kept:
                 self._path.parent.mkdir(parents=True, exist_ok=True)
                 write_atomically(self._path, (json.dumps(self._results, indent=1) + "\n").encode())
         return [self._results[text] for text in texts]
+
+
+def known_as(policy: str) -> list[str]:
+    """Return the words of a question for a policy: its name, and its file's digest if it has a file, since a policy
+    trained anew under the same name walks otherwise."""
+    try:
+        return [policy, digest_of_file(find_policy(policy))]
+    except SpringfootError:  # a baseline, a function, a copy
+        return [policy]

@@ -20,7 +20,7 @@ from springfoot.evaluation.recording import policy_and_settings, record_feet
 from springfoot.evaluation.report import STYLE
 from springfoot.files.markdown import MISSING, table
 
-from ..base.kept import Kept
+from ..base.kept import Kept, known_as
 from ..base.study import Answer, OnProgress, PersonsStudy
 from .foot_numbers import FOOT_NUMBERS, numbers_of_feet
 from .walked_speeds import ASKED_SPEEDS, TWO_PRICES, WALKED_SPEEDS, Row, at_walked_speeds, lowest, rows_csv
@@ -107,7 +107,7 @@ class SpringMap(PersonsStudy):
             recordings = record_feet(acting, settings, feet, name=policy, progress=progress, **self.how)
             return {"walks": [numbers_of_feet(measure(recording)) for recording in recordings]}
 
-        how = {**self.how, "threads": 0, "policy": policy, "seconds": self.seconds}
+        how = {**self.how, "threads": 0, "policy": known_as(policy), "seconds": self.seconds}
         return kept.get([how, given, list(feet), FOOT_NUMBERS], make)["walks"]
 
     def _cases(self) -> Sequence[float]:

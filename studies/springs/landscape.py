@@ -27,7 +27,7 @@ from springfoot.evaluation.report import STYLE
 from springfoot.files.markdown import MISSING, table
 
 from ..base.columns import COMPARED_JOINTS
-from ..base.kept import Kept
+from ..base.kept import Kept, known_as
 from ..base.study import Answer, OnProgress, PersonsStudy
 from ..feet.walked_speeds import ASKED_SPEEDS, TWO_PRICES, WALKED_SPEEDS, Row, at_walked_speeds, price_numbers, rows_csv
 
@@ -104,7 +104,8 @@ class Landscape(PersonsStudy):
             pairs = zip(metrics_of(baselines, 0.0), metrics_of(baselines, self.push_newton), strict=True)
             return [_cell_numbers(metrics, pushed) for metrics, pushed in pairs]
 
-        return kept.get_all([[self.walked, self.push_newton, cell, given] for cell in cells], make)
+        question = [known_as(person), self.walked, self.push_newton, self.seconds, speed]
+        return kept.get_all([[*question, cell] for cell in cells], make)
 
     def _cells(self) -> Sequence[tuple[float, float, float]]:
         """Return the stiffness of ankles and of toes [N m/rad] and the commanded speed [m/s] of each cell."""

@@ -35,7 +35,7 @@ from springfoot.files.writing import csv_text
 
 from ..base.columns import COMPARED_JOINTS
 from ..base.intervals import POWER
-from ..base.kept import Kept
+from ..base.kept import Kept, known_as
 from ..base.study import Answer, OnProgress, WalkingStudy
 from ..searches.cma_search import generations
 from .links import UNDISTURBED_WALK, UNIT_OF_AIM, Aim, Link, compared, fewest_falls, links_table, verdict
@@ -316,7 +316,7 @@ class When(WalkingStudy):
     @property
     def _flags_in_question(self) -> list[Any]:
         """Return the flags on which all costs and numbers depend, as plain JSON values."""
-        return [self.person, self.seconds, self.seed, self.population, self.pushes[0]]
+        return [known_as(self.person), self.seconds, self.seed, self.population, self.pushes[0]]
 
 
 @lru_cache(maxsize=8)

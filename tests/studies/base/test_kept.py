@@ -2,7 +2,7 @@
 
 import json
 
-from springfoot.studies.base.kept import Kept
+from springfoot.studies.base.kept import Kept, known_as
 
 
 def test_what_was_measured_is_kept(tmp_path):
@@ -33,3 +33,14 @@ def test_of_several_questions_those_without_an_answer_are_made_together(tmp_path
         kept.get_all(["a", "b", "c"], make) == Kept(tmp_path / "kept.json").get_all(["a", "b", "c"], make) == expected
     )
     assert asked == [[0, 2]]
+
+
+def test_a_policy_is_known_by_its_files_content(tmp_path):
+    files = [tmp_path / "a.safetensors", tmp_path / "b.safetensors"]
+    for file, content in zip(files, (b"one", b"another"), strict=True):
+        file.write_bytes(content)
+    (_, first), (_, second) = map(known_as, map(str, files))
+    assert first != second
+    files[0].write_bytes(b"another")
+    assert known_as(str(files[0])) == [str(files[0]), second]
+    assert known_as("constant:300,40") == ["constant:300,40"]

@@ -22,9 +22,15 @@ PUSHES = {"push_newton": 100.0, "push_interval": 2.0, "episode_seconds": 5.0}
 
 
 @cache
-def pushed(name, decisions=None, episodes=32):
-    policy, settings = prepare_pushed(name, PUSHES | ({"decisions": decisions} if decisions else {}), threads=1)
+def pushed(name, episodes=32, **given):
+    policy, settings = prepare_pushed(name, PUSHES | given, threads=1)
     return record(policy, settings, name=name, episodes=episodes, threads=1)
+
+
+def errors_of_springs(rows: list[Row]) -> dict[tuple[str, float], float]:
+    """Joint and beginning of each loaded phase that is called a spring -> error of its K, as a share."""
+    springs = [row for row in loaded(rows) if row.pushed.verdict == SPRING and row.pushed.stiffness]
+    return {(row.joint, row.start): row.pushed.stiffness.value / row.applied[0] - 1.0 for row in springs}
 
 
 def loaded(rows: list[Row]) -> list[Row]:
@@ -96,8 +102,25 @@ def test_the_pretrained_policy_reacts_in_every_loaded_phase():
 
 
 def test_a_stiffness_held_for_20_ms_is_no_function_of_the_phase_where_it_ramps():
-    ankle = {row.start: row for row in identified(samples(pushed("schedule", "50hz"))) if row.joint == "ankle"}
+    ankle = {
+        row.start: row for row in identified(samples(pushed("schedule", decisions="50hz"))) if row.joint == "ankle"
+    }
     assert ankle[0.22].pushed.verdict == REACTS
+
+
+def test_a_stiffness_that_acts_20_ms_late_is_found_or_no_spring_and_one_of_40_ms_may_read_wrong():
+    late = identified(samples(pushed("schedule", stiffness_delay_s=0.02), 1.0))
+    errors = errors_of_springs(late)
+    assert max(map(abs, errors.values())) < 0.05 and len(errors) < len(loaded(late))
+    later = errors_of_springs(identified(samples(pushed("schedule", stiffness_delay_s=0.04), 1.0)))
+    assert max(later.values()) > 0.25  # the limit that docs/reference/metrics.md tells
+
+
+def test_torque_of_another_clock_reads_wrong_as_a_spring():
+    recording = pushed("schedule")
+    late = recording.series | {"torque": np.roll(recording.series["torque"], 1, axis=1)}
+    errors = errors_of_springs(identified(samples(replace(recording, series=late), 1.0)))
+    assert 0.1 < max(map(abs, errors.values())) < 0.2  # the limit that docs/reference/metrics.md tells
 
 
 def test_a_phase_without_samples_is_one_line():
