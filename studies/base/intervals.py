@@ -13,6 +13,8 @@ LEVEL = 0.95
 """Confidence level of every interval."""
 POWER = 0.8
 """Chance with which the smallest visible difference is seen."""
+LEAST_AGREEING = 5
+"""Persons that must all have one sign for it to be known where the interval holds 0: by chance they do in 1 of 16."""
 
 
 def mean_interval(values: NDArray, level: float = LEVEL) -> tuple[float, float]:
@@ -53,6 +55,19 @@ def interval_of_persons(values: Sequence[NDArray], level: float = LEVEL) -> tupl
         return mean_interval(sample, level)
     reach = float(t.ppf(0.5 + level / 2, len(sample) - 1) * np.std(sample, ddof=1) / np.sqrt(len(sample)))
     return float(sample.mean()) - reach, float(sample.mean()) + reach
+
+
+def known_sign(values: Sequence[NDArray]) -> int:
+    """Return the sign of the mean of `of_persons` from the same values, 1 or -1, or 0 where it is not known.
+
+    It is known if the interval leaves 0 out, or if all persons have it and are `LEAST_AGREEING` or more.
+    """
+    sample = of_persons(values)
+    if len(sample) < 2:
+        return 0
+    low, high = interval_of_persons(values)
+    agreeing = all(map(len, values)) and len(values) >= LEAST_AGREEING and abs(np.sign(sample).sum()) == len(sample)
+    return int(np.sign(sample.mean())) if agreeing or low > 0.0 or high < 0.0 else 0
 
 
 def visible(differences: NDArray) -> float | None:

@@ -22,7 +22,7 @@ from springfoot.errors import SpringfootError, perhaps
 from springfoot.files.markdown import MISSING, table
 from springfoot.files.text_table import read_csv
 
-from ..base.intervals import interval_of_persons, of_persons
+from ..base.intervals import LEAST_AGREEING, interval_of_persons, known_sign, of_persons
 from ..base.study import Answer, OnProgress, PersonsStudy
 from ..feet.walked_speeds import Row, at_walked_speeds, rows_csv
 from .condition_effects import Measured, by_condition
@@ -36,7 +36,7 @@ AROUND = (-0.15, 0.0, 0.15)
 0.13 m/s in one walk of twenty."""
 _RIGHT = "right"
 UNCLEAR = "unclear"
-"""Sign of an effect with 0 in its interval, or of a single episode, which has none."""
+"""Sign of an effect that is not known (`known_sign`)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,8 +87,8 @@ class Effects(PersonsStudy):
                 f"**{verdict(rows)}**",
                 effects_table([row for row in rows if row["run"]]),
                 f"Persons: {', '.join(self.persons)}; {self.what_ran} of each condition. In brackets 95 % intervals "
-                "over persons, of one person over its episodes; a sign is unclear where the interval holds 0 or one "
-                "episode is left. "
+                "over persons, of one person over its episodes. A sign is known where the interval leaves 0 out, or "
+                f"where all persons, {LEAST_AGREEING} or more, have it; else it is unclear. "
                 "Energy and work are compared "
                 "where all conditions walk equally fast, all else at the commanded speed. effects.csv tells the rest.",
                 *without,
@@ -150,11 +150,14 @@ def effect_row(
             for name, effect in experiment.beside.items()
         }
     notes = [experiment.note, *_falls_by_condition(walks.values())]
-    if all(map(len, values.values())):
+    found = [person for person, own in values.items() if len(own)]
+    if found:
         pairs = np.concatenate(list(values.values()))  # (pairs,), a person's episode under both conditions
         # Clauses of the published tolerance beside its range.
-        clauses = {words: all(map(holds, measured.values())) for words, holds in experiment.also.items()}
+        clauses = {words: all(holds(measured[person]) for person in found) for words, holds in experiment.also.items()}
         row |= _agreement(published, list(values.values()), clauses)
+        if len(found) < len(values):
+            notes.append(f"of {len(found)} of {len(values)} persons, those with an episode that has all numbers")
         if len(pairs) < (episodes := sum(len({walk["episode"] for walk in own}) for own in walks.values())):
             notes.append(f"of {len(pairs)} of {episodes} episodes, in which all walk, and as fast")
         notes += [f"{words}: {'yes' if holds else 'no'}" for words, holds in clauses.items()]
@@ -185,7 +188,7 @@ def _agreement(published: Mapping[str, str], values: Sequence[NDArray], clauses:
         "low": low,
         "high": high,
         "pairs": sum(map(len, values)),
-        "sign_is": sign_is(published["sign"], low, high),
+        "sign_is": sign_is(published["sign"], known_sign(values)),
         "size_within": size_within(published, mean, clauses),
     }
 
@@ -263,14 +266,14 @@ def _label(key: Any) -> str:
 # Agreement ----------------------------------------------------------------------------------------------------
 
 
-def sign_is(sign: str, low: float | None, high: float | None) -> str | None:
-    """Return "right", "wrong" or `UNCLEAR` for an effect with the interval `low` to `high`, held against the published
-    `sign` + or -; None without a published sign."""
+def sign_is(sign: str, known: int) -> str | None:
+    """Return "right", "wrong" or `UNCLEAR` for an effect whose sign is `known` (`known_sign`), held against the
+    published `sign` + or -; None without a published sign."""
     if not sign:
         return None
-    if low is None or high is None or low <= 0.0 <= high:
+    if not known:
         return UNCLEAR
-    return _RIGHT if (low > 0.0) == (sign == "+") else "wrong"
+    return _RIGHT if (known > 0) == (sign == "+") else "wrong"
 
 
 def size_within(published: Mapping[str, str], measured: float, also: Mapping[str, bool]) -> int | None:

@@ -18,7 +18,7 @@ import numpy as np
 from springfoot.arrays import NDArray
 from springfoot.files.markdown import MISSING, table, text_of
 
-from ..base.intervals import interval_of_persons, of_persons, visible
+from ..base.intervals import interval_of_persons, known_sign, of_persons, visible
 from ..base.study import Answer, OnProgress, PersonsStudy
 from ..feet.both_feet import both, braced
 from ..feet.walked_speeds import ASKED_SPEEDS, WALKED_SPEEDS, Row, at_walked_speeds, rows_csv
@@ -179,7 +179,7 @@ def beside_rows(speed: float, measured: Mapping[str, Measured]) -> list[dict[str
     for name, effect in BESIDE.items():
         paired = _paired_numbers(effect, measured)
         of_people = {key: published[name][key] or None for key in ("source", "sign", "size", "unit")}
-        sign = sign_is(published[name]["sign"], paired["low"], paired["high"])
+        sign = sign_is(published[name]["sign"], known_sign([_finite_values(effect, own) for own in measured.values()]))
         rows.append(
             {"effect": name, **of_people, "speed_m_s": speed, **paired, "sign_is": sign if paired["pairs"] else None}
         )

@@ -64,9 +64,9 @@ def test_every_experiment_has_valid_settings_and_an_understood_tolerance(name):
 
 
 def test_signs_are_right_wrong_or_unclear():
-    assert [sign_is(sign, 0.1, 0.3) for sign in ("+", "-", "")] == ["right", "wrong", None]
-    assert [sign_is(sign, -0.3, -0.1) for sign in ("+", "-", "")] == ["wrong", "right", None]
-    assert sign_is("+", -0.1, 0.3) == sign_is("-", 0.0, 0.3) == sign_is("+", None, None) == "unclear"
+    assert [sign_is(sign, 1) for sign in ("+", "-", "")] == ["right", "wrong", None]
+    assert [sign_is(sign, -1) for sign in ("+", "-", "")] == ["wrong", "right", None]
+    assert [sign_is(sign, 0) for sign in ("+", "-", "")] == ["unclear", "unclear", None]
 
 
 @pytest.mark.parametrize(
@@ -170,6 +170,19 @@ def test_falls_are_told_left_out_in_pairs_and_a_condition_in_which_all_fall_is_a
     assert (row["measured"], row["sign_is"], row["falls"]) == (None, None, "3 of 6")
     assert row["note"].endswith("no episode has all numbers: stay always falls")
     assert "signs are right in 0 of 1" in verdict([row]) and "| – |" in effects_table([row])
+
+
+def test_a_person_without_a_number_is_told_and_leaves_the_others_theirs():
+    walks = planted(
+        "stay_propulsion", lambda condition, *_: {"right_forward_bw": {"sound": 0.2, "stay": 0.1}[condition]}
+    )
+    fallen = planted(
+        "stay_propulsion", lambda *_: {"right_forward_bw": 0.2}, falls={("stay", episode) for episode in range(3)}
+    )
+    row = row_of("stay_propulsion", {"one": walks, "other": fallen})
+    assert (row["measured"], row["one"], row["other"]) == (pytest.approx(-0.1), pytest.approx(-0.1), None)
+    assert "of 1 of 2 persons, those with an episode that has all numbers" in row["note"]
+    assert row["sign_is"] == "right" and row["falls"] == "3 of 12"
 
 
 def test_a_condition_that_does_not_reach_the_speed_is_a_miss_that_tells_its_speed():
