@@ -9,8 +9,11 @@ import numpy as np
 from springfoot.arrays import NDArray
 from springfoot.files.markdown import MISSING, table, text_of
 
-from ..base.intervals import LEVEL, mean_interval, paired_p, share_interval, visible
+from ..base.intervals import LEVEL, interval_of_persons, of_persons, paired_p, share_interval, visible
 
+Pair = tuple[Mapping[str, Sequence[Any]], Mapping[str, Sequence[Any]]]
+"""Walks of one person's episodes with the inner and with the outer class: `fell`, `speed_m_s`, and by each `Aim` its
+number, None where it could not be measured, as lists with an entry for each episode."""
 Aim = Literal["fibre", "likeness"]
 """Aim of a search: least fibre work a metre; least mean over joints of the angles' rms from people's mean."""
 UNIT_OF_AIM: dict[str, str] = dict(zip(get_args(Aim), ("J/kg/m", "°"), strict=True))
@@ -23,6 +26,8 @@ UNDISTURBED_WALK = "undisturbed"
 class Link:
     """Comparison of an outer class with the inner one on the same episodes, for one aim and condition."""
 
+    person: str
+    """Person, or persons in a word."""
     aim: str
     """Aim of both searches."""
     inner: str
@@ -32,11 +37,12 @@ class Link:
     condition: str
     """Condition in words."""
     episodes: int
-    """Number of episodes."""
+    """Number of episodes, of all persons."""
     inner_mean: float | None
-    """Aim's number with the inner class, mean of the episodes in which both walk to the end; None without any."""
+    """Aim's number with the inner class, mean of the episodes in which both walk to the end, or of persons' means
+    (`of_persons`); None without any."""
     difference: float | None
-    """Outer less inner, mean of the same episodes; negative where the outer is better."""
+    """Outer less inner, mean of the same; negative where the outer is better."""
     low: float | None
     """Lower end of its 95 % interval."""
     high: float | None
@@ -61,47 +67,36 @@ class Link:
     """p of McNemar's exact test that both fall equally often."""
 
 
-def compared(
-    aim: str,
-    names: tuple[str, str],
-    condition: str,
-    inner: Mapping[str, Sequence[Any]],
-    outer: Mapping[str, Sequence[Any]],
-) -> Link:
-    """Return the comparison of two classes with the `names` (inner, outer), from their walks of the same episodes.
+def compared(person: str, aim: str, names: tuple[str, str], condition: str, pairs: Sequence[Pair]) -> Link:
+    """Return the comparison of two classes with the `names` (inner, outer), from a pair of each person's walks of the
+    same episodes.
 
-    `inner` and `outer` have lists with an entry for each episode: `fell`, `speed_m_s`, and by each `Aim` its number,
-    None where it could not be measured. Numbers are of the episodes that both classes walk to the end.
+    Numbers are of the episodes that both classes walk to the end; of several persons means count (`of_persons`).
     """
-    both = [
-        index
-        for index, pair in enumerate(zip(inner[aim], outer[aim], strict=True))
-        if None not in pair and not (inner["fell"][index] or outer["fell"][index])
-    ]
-
-    def values(walks: Mapping[str, Sequence[Any]], name: str) -> NDArray:
-        """Return the numbers `name` (n,) of the n episodes in which both classes walk to the end."""
-        return np.array([walks[name][index] for index in both], float)
-
+    inner, outer, inner_speed, outer_speed = zip(*(_walked_by_both(aim, *pair) for pair in pairs), strict=True)
     numbers: dict[str, float | None] = dict.fromkeys(
         ("inner_mean", "difference", "low", "high", "visible", "speed_m_s", "speed_difference_m_s")
     )
-    if both:
-        difference = values(outer, aim) - values(inner, aim)
-        numbers |= zip(("low", "high"), mean_interval(difference), strict=True)
+    if any(map(len, inner)):
+        differences = [after - before for before, after in zip(inner, outer, strict=True)]
+        numbers |= zip(("low", "high"), interval_of_persons(differences), strict=True)
         numbers |= {
-            "inner_mean": float(values(inner, aim).mean()),
-            "difference": float(difference.mean()),
-            "visible": visible(difference),
-            "speed_m_s": float(values(inner, "speed_m_s").mean()),
-            "speed_difference_m_s": float((values(outer, "speed_m_s") - values(inner, "speed_m_s")).mean()),
+            "inner_mean": float(of_persons(inner).mean()),
+            "difference": float(of_persons(differences).mean()),
+            "visible": visible(of_persons(differences)),
+            "speed_m_s": float(of_persons(inner_speed).mean()),
+            "speed_difference_m_s": float(of_persons(outer_speed).mean() - of_persons(inner_speed).mean()),
         }
     falls: dict[str, Any] = {}
-    fell = {"inner": np.array(inner["fell"], bool), "outer": np.array(outer["fell"], bool)}
+    fell = {
+        name: np.concatenate([np.array(pair[index]["fell"], bool) for pair in pairs])
+        for index, name in enumerate(("inner", "outer"))
+    }
     for name, of_class in fell.items():
         low, high = share_interval(int(of_class.sum()), len(of_class))
         falls |= {f"{name}_falls": int(of_class.sum()), f"{name}_falls_low": low, f"{name}_falls_high": high}
     return Link(
+        person=person,
         aim=aim,
         inner=names[0],
         outer=names[1],
@@ -111,6 +106,24 @@ def compared(
         **numbers,
         **falls,
     )
+
+
+def _walked_by_both(
+    aim: str, inner: Mapping[str, Sequence[Any]], outer: Mapping[str, Sequence[Any]]
+) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+    """Return the aim's number with the inner and with the outer class, and both speeds, each (n,), of the n episodes of
+    a `Pair` that both walk to the end."""
+    both = [
+        index
+        for index, pair in enumerate(zip(inner[aim], outer[aim], strict=True))
+        if None not in pair and not (inner["fell"][index] or outer["fell"][index])
+    ]
+
+    def values(walks: Mapping[str, Sequence[Any]], name: str) -> NDArray:
+        """Return the numbers `name` (n,) of these episodes."""
+        return np.array([walks[name][index] for index in both], float)
+
+    return values(inner, aim), values(outer, aim), values(inner, "speed_m_s"), values(outer, "speed_m_s")
 
 
 def fewest_falls(episodes: int) -> int | None:

@@ -28,7 +28,7 @@ def planted(difference, spread, episodes, seed):
     generator = np.random.default_rng(seed)
     starts = generator.normal(4.0, 10.0 * spread, episodes)
     outer = starts + difference + generator.normal(0.0, spread, episodes)
-    return compared("fibre", NAMES, "undisturbed", walks(starts), walks(outer))
+    return compared("one", "fibre", NAMES, "undisturbed", [(walks(starts), walks(outer))])
 
 
 def interval(link):
@@ -57,13 +57,21 @@ def test_a_difference_of_the_smallest_visible_size_is_seen_four_times_in_five():
 
 
 def test_episodes_that_fall_do_not_count_in_the_difference_but_in_the_falls():
-    link = compared("fibre", NAMES, "±300 N", walks([4.0, 9.0, 4.2], fell=(1,)), walks([3.9, 3.0, 4.1]))
+    link = compared("one", "fibre", NAMES, "±300 N", [(walks([4.0, 9.0, 4.2], fell=(1,)), walks([3.9, 3.0, 4.1]))])
     assert link.difference == pytest.approx(-0.1) and link.inner_mean == pytest.approx(4.1)
     assert (link.inner_falls, link.outer_falls, link.episodes) == (1, 0, 3)
     assert link.inner_falls_low < 1 / 3 < link.inner_falls_high
-    nobody = compared("fibre", NAMES, "±300 N", walks([None, None], fell=(0, 1)), walks([3.9, 3.0]))
+    nobody = compared("one", "fibre", NAMES, "±300 N", [(walks([None, None], fell=(0, 1)), walks([3.9, 3.0]))])
     assert (nobody.difference, nobody.inner_falls) == (None, 2)
     assert "| – | – |" in links_table([nobody])
+
+
+def test_of_several_persons_their_means_count_and_the_falls_of_all():
+    pairs = [(walks([4.0, 4.0], fell=(1,)), walks([3.9, 3.0])), (walks([6.0, 8.0]), walks([5.9, 7.5]))]
+    link = compared("all", "fibre", NAMES, "undisturbed", pairs)
+    assert (link.inner_mean, link.difference) == (pytest.approx(5.5), pytest.approx(-0.2))
+    assert interval(link) == pytest.approx((-0.2 - 12.706205 * 0.1, -0.2 + 12.706205 * 0.1))  # Student's t of 2 persons
+    assert (link.episodes, link.inner_falls, link.outer_falls) == (4, 1, 0)
 
 
 def test_falls_differ_from_the_fewest_on_that_the_test_shows():
@@ -73,7 +81,7 @@ def test_falls_differ_from_the_fewest_on_that_the_test_shows():
         """Return the sentence on falls if the inner class alone falls in so many of 16 episodes."""
         level = planted(-1.0, 0.1, 16, 0)
         inner, outer = walks([4.0] * 16, fell=range(alone)), walks([4.0] * 16)
-        return verdict([level, compared("fibre", NAMES, "±300 N", inner, outer)])
+        return verdict([level, compared("one", "fibre", NAMES, "±300 N", [(inner, outer)])])
 
     assert falls_of(5).endswith("Falls differ at no link.")
     assert falls_of(6).endswith("Falls differ with per phase (fibre, ±300 N: 6 to 0 of 16).")
@@ -101,8 +109,9 @@ def test_kept_costs_and_numbers_are_not_walked_again(tmp_path, monkeypatch, caps
     words += ["--pushes", "100", "--roughness", "0.01", "--seconds", "5.5", "--threads", "1"]
     words += ["--keep", str(tmp_path / "kept")]
     assert study_main([*words, "--out", str(tmp_path / "first")]) == 0
-    assert len(list((tmp_path / "kept").iterdir())) == 1 + 7  # numbers, and the costs of seven searches
-    monkeypatch.setattr("springfoot.studies.springs.when._batch", None)  # walking again would fail
+    (folder,) = (tmp_path / "kept").iterdir()  # of the person
+    assert len(list(folder.iterdir())) == 1 + 7  # numbers, and the costs of seven searches
+    monkeypatch.setattr("springfoot.studies.springs.class_search._batch", None)  # walking again would fail
     assert study_main([*words, "--out", str(tmp_path / "second")]) == 0
     for name in ("links.csv", "stiffness.csv"):
         assert (tmp_path / "first" / name).read_bytes() == (tmp_path / "second" / name).read_bytes()

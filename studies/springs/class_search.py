@@ -1,0 +1,185 @@
+"""Search a class of stiffness for one person, and walk the test with what was found."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import cma
+import numpy as np
+
+from springfoot.agents.policies import find_policy
+from springfoot.arrays import NDArray
+from springfoot.envs.batch import Biped
+from springfoot.evaluation.numbers import measure
+from springfoot.evaluation.recording import Episodes, Recording, planned_course, policy_and_settings, record_walk
+
+from ..base.columns import COMPARED_JOINTS
+from ..base.kept import Kept, known_as
+from ..base.study import OnProgress
+from ..searches.cma_search import generations
+from .links import UNDISTURBED_WALK, UNIT_OF_AIM
+from .stiffness_classes import StiffnessClass
+
+FALL_COST = 4.0
+"""Cost of a search if every episode falls, in the aim's unit; chosen: as much as the number itself."""
+HELD_SPEED = 0.1
+"""Difference from the commanded speed that costs as much as all falls, by its square [m/s]; chosen."""
+NO_WALK = 3 * FALL_COST
+"""Cost of a stiffness with which no stride could be measured."""
+FIRST_SPREAD = 0.2
+"""First spread of a search, in ln K and in gains; chosen."""
+CHOOSING = 4
+"""Walks on which a search's result is held against its beginning; chosen."""
+TEST_SEED = 500_000
+"""Difference of the first seed of the test from the first one of the searches."""
+
+
+class Condition(NamedTuple):
+    """Disturbance of a walk."""
+
+    push_newton: float = 0.0
+    """Size of pushes [N]."""
+    unevenness_m: float = 0.0
+    """Unevenness of the ground [m]."""
+
+    @property
+    def words(self) -> str:
+        """Return the condition in words."""
+        if self.push_newton:
+            return f"±{self.push_newton:g} N"
+        return f"rough by {1000 * self.unevenness_m:g} mm" if self.unevenness_m else UNDISTURBED_WALK
+
+
+@dataclass(frozen=True, kw_only=True)
+class PersonsSearch:
+    """Searches and tests of one person, whose costs and numbers are kept."""
+
+    person: str
+    """Policy that moves the person."""
+    seconds: float
+    """Length of each episode."""
+    seed: int
+    """Generation g walks from the start of seed + g, the test's episode i from that of seed + `TEST_SEED` + i."""
+    generations: int
+    """Generations of each search."""
+    population: int
+    """Candidates of each generation; each walks one episode, pushed."""
+    push_newton: float
+    """Size of these pushes [N]."""
+    threads: int
+    """Threads of the physics."""
+    folder: Path | None
+    """Folder in which the searches' costs are kept, to go on after a stop."""
+    kept: Kept
+    """Numbers kept so far."""
+    progress: OnProgress
+    """Function called with the simulated time [s] of each step."""
+
+    def search(self, aim: str, of_class: StiffnessClass, start: NDArray, link: StiffnessClass) -> NDArray:
+        """Search the class `of_class` from the vector `start`, for the link whose outer class is `link`; return the
+        vector found: the search's mean at the end, or `start` if that costs no more on other walks.
+
+        Costs in `folder` and in `kept` are not computed again.
+        """
+
+        def costs_of(generation: int, vectors: list[NDArray]) -> NDArray:
+            """Return the costs of a generation, whose candidates all walk from the same start."""
+            return self._costs(aim, of_class, vectors, self.seed + generation, 1)
+
+        options = {"popsize": self.population, "seed": self.seed + 1, "verbose": -9}
+        strategy = cma.CMAEvolutionStrategy(start, FIRST_SPREAD, options)
+        question = [*self._in_question, aim, of_class.name, link.name, start.tolist()]
+        name = f"{aim}-{link.name}-{of_class.name}.json".replace(" ", "-")
+        file = None if self.folder is None else self.folder / name
+        for _ in generations(strategy, self.generations, costs_of, file, question):
+            pass
+        ends = [start, np.asarray(strategy.mean)]
+        first_seed = self.seed + TEST_SEED // 2
+
+        def costs_of_ends() -> dict[str, Any]:
+            """Return the costs of start and mean on walks that the generations did not have."""
+            return {"costs": self._costs(aim, of_class, ends, first_seed, CHOOSING).tolist()}
+
+        asked = [*question, [end.tolist() for end in ends]]
+        return ends[int(np.argmin(self.kept.get(asked, costs_of_ends)["costs"]))]
+
+    def test_numbers(
+        self, of_class: StiffnessClass, vector: NDArray, condition: Condition, episodes: int
+    ) -> dict[str, Any]:
+        """Return `fell` and the numbers of `aim_numbers` as lists over the test's episodes under a condition; they come
+        from `kept` if it has them."""
+
+        def make() -> dict[str, Any]:
+            """Walk the test's episodes; return their lists."""
+            (walked,) = self._walk(of_class, [vector], self.seed + TEST_SEED, episodes, condition)
+            rows = [aim_numbers(walked.of_episode(index)) for index in range(episodes)]
+            return {
+                "fell": (walked.fall_reason != "").tolist(),
+                **{name: [row[name] for row in rows] for name in rows[0]},
+            }
+
+        return self.kept.get([*self._in_question, episodes, of_class.name, vector.tolist(), condition], make)
+
+    def _costs(self, aim: str, of_class: StiffnessClass, vectors: Sequence[NDArray], seed: int, starts: int) -> NDArray:
+        """Return the cost of each of V vectors, (V,), from `starts` pushed walks: the aim's number plus costs of the
+        error of speed and of the share that falls; `NO_WALK` if no number could be measured."""
+        pushed = Condition(push_newton=self.push_newton)
+        costs = []
+        for walked in self._walk(of_class, vectors, seed, starts, pushed):
+            numbers = aim_numbers(walked)
+            if numbers[aim] is None:
+                costs.append(NO_WALK)
+            else:
+                error = (numbers["speed_m_s"] - walked.settings.speed) / HELD_SPEED
+                costs.append(numbers[aim] + FALL_COST * ((walked.fall_reason != "").mean() + error**2))
+        return np.array(costs)
+
+    def _walk(
+        self, of_class: StiffnessClass, vectors: Sequence[NDArray], seed: int, episodes: int, condition: Condition
+    ) -> list[Recording]:
+        """Record the same episodes with each of V vectors, side by side; return a recording for each."""
+        person = str(find_policy(self.person))
+        biped = _batch(person, self.seconds, condition, len(vectors) * episodes, self.threads)
+        settings = biped.settings
+        seeds = [seed + episode for _ in vectors for episode in range(episodes)]
+        biped.reset(np.arange(len(seeds)), seeds)
+        kept = Episodes.of_length(settings, len(seeds))
+        act = of_class.policy(np.repeat(np.stack(vectors), episodes, axis=0), settings)
+        record_walk(biped, act, kept, progress=self.progress)
+        course: dict[str, Any] = planned_course(biped.plan)
+        return [
+            Recording(
+                policy=of_class.name,
+                settings=settings,
+                seed=seed,
+                **kept.of(slice(index * episodes, (index + 1) * episodes)),
+                **course,
+            )
+            for index in range(len(vectors))
+        ]
+
+    @property
+    def _in_question(self) -> list[Any]:
+        """Return the parts of every question, on which all costs and numbers depend."""
+        return [known_as(self.person), self.seconds, self.seed, self.population, self.push_newton]
+
+
+@lru_cache(maxsize=8)
+def _batch(person: str, seconds: float, condition: Condition, count: int, threads: int) -> Biped:
+    """Return `count` environments with the person and the condition, cached: reset them before each use."""
+    given = {"person": person, "episode_seconds": seconds, **condition._asdict()}
+    _, settings = policy_and_settings("constant", given)
+    return Biped(settings, count, threads)
+
+
+def aim_numbers(recording: Recording) -> dict[str, Any]:
+    """Return speed and the number of each `Aim` of a recording, from its metrics; None of all if one is missing."""
+    metrics = measure(recording).metrics
+    angles = [metrics["joints"][joint]["rmse_deg"] for joint in COMPARED_JOINTS]
+    fibre = metrics["effort"]["fibre_J_kg_m"]
+    speed = metrics["speed_m_s"]["mean"]
+    if None in (*angles, fibre, speed):
+        return {"speed_m_s": None, **dict.fromkeys(UNIT_OF_AIM)}
+    return {"speed_m_s": speed, "fibre": fibre, "likeness": float(np.mean(angles))}
