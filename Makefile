@@ -198,21 +198,17 @@ format: install
 predict: install
 	$(BIN)/springfoot study predict
 
-# The studies that docs/answers.md rests on, with the person of the package, each into a folder: two at a time with
+# The studies that docs/answers.md rests on, with the persons of the package, each into a folder: two at a time with
 # `make -j2 answers`, with the same bits. Their walks are kept in build/answers/kept: after a stop the same command goes on.
 ANSWERS := build/answers$(if $(QUICK),-quick)
-STUDY_landscape := landscape learned
-STUDY_when := when learned
-STUDY_toe := toe learned
-STUDY_effects := effects learned
-STUDY_controls := controls learned
+PERSONS := $(if $(QUICK),learned,learned learned-2 learned-3 learned-4 learned-5)
 
 answers: $(foreach study,landscape when toe effects controls,$(ANSWERS)/$(study)/report.md)
 
 $(ANSWERS)/%/report.md: $(if $(QUICK),FORCE) | install
 	$(if $(QUICK),rm -rf $(@D))
 	@began=$$SECONDS; \
-	$(BIN)/python -m springfoot study $(STUDY_$*) --out $(@D) $(if $(QUICK),--quick,--keep $(ANSWERS)/kept/$*) \
+	$(BIN)/python -m springfoot study $* $(PERSONS) --out $(@D) $(if $(QUICK),--quick,--keep $(ANSWERS)/kept/$*) \
 	  && echo "$*: $$((SECONDS - began)) s"
 
 FORCE:

@@ -10,7 +10,7 @@ pushed, its cost of a metre at equal walked speed, and its distance from people'
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import pairwise, product
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -37,8 +37,14 @@ TOES = (7.0, 14.0, 28.0, 56.0, 84.0)
 """Stiffness of both toes [N m/rad], a quarter to three times that of toes in people."""
 NOT_DEARER = 0.05
 """Share by which a price may exceed the least one and not be told apart from it; as `told_apart.GAP` of feet."""
+AGREEING = 3
+"""Persons who must all agree for a direction to be known."""
 BOTH_STIFFNESSES = ("ankle_N_m_rad", "toe_N_m_rad")
 """Columns of the two stiffnesses."""
+DISTANCE = "angles_rmse_deg"
+"""Column of the distance from people: rms of the angles' mean curves from theirs, mean over `COMPARED_JOINTS` [deg]."""
+SEARCHED = {TWO_PRICES[0]: "fibre work", TWO_PRICES[1]: "effort", DISTANCE: "distance from people"}
+"""Column whose least value is looked for -> its name."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,8 +65,8 @@ class Landscape(PersonsStudy):
         return 2.0 * len(self.persons) * len(self._cells()) * self.episodes * self.seconds
 
     def ask(self, progress: OnProgress) -> Answer:
-        """Walk every person in every cell (ankle, toe, commanded speed); find at each walked speed the cells of least
-        fibre work and of least effort a metre."""
+        """Walk every person in every cell (ankle, toe, commanded speed); find at each walked speed the cells that have
+        the least of each number of `SEARCHED`."""
         kept = Kept(self.keep)
         policies = {(ankle, toe): f"constant:{ankle:g},{toe:g}" for ankle, toe, _ in self._cells()}
         speeds = dict.fromkeys(speed for _, _, speed in self._cells())
@@ -73,8 +79,9 @@ class Landscape(PersonsStudy):
             | numbers[person, *cell, speed]
             for person, (*cell, speed) in product(self.persons, self._cells())
         ]
-        even = at_walked_speeds(walks, ("person", *BOTH_STIFFNESSES), (0.9,) if self.quick else WALKED_SPEEDS)
-        least = cheapest(even)
+        speeds_walked = (0.9,) if self.quick else WALKED_SPEEDS
+        even = at_walked_speeds(walks, ("person", *BOTH_STIFFNESSES), speeds_walked, tuple(SEARCHED))
+        least = cells_of_least(even)
         files = {
             "walks.csv": rows_csv(walks),
             "equal_speeds.csv": rows_csv(even),
@@ -118,17 +125,19 @@ class Landscape(PersonsStudy):
         columns = {"undisturbed": "falls", f"pushed by ±{self.push_newton:g} N": "falls_pushed"}
         falls = ", ".join(f"{_count_with_falls(walks, column)} {name}" for name, column in columns.items())
         ways = [
-            f"The faster walk has its least {price_name} at a stiffer {joint} in {direction(least, column, price)}."
-            for price, price_name in zip(TWO_PRICES, ("fibre work", "effort"), strict=True)
-            for column, joint in zip(BOTH_STIFFNESSES, ("ankle", "toe"), strict=True)
+            f"least {name}: ankle {direction(least, BOTH_STIFFNESSES[0], number)}, "
+            f"toe {direction(least, BOTH_STIFFNESSES[1], number)}"
+            for number, name in SEARCHED.items()
         ]
         return "\n\n".join(
             [
-                "![Fibre work and effort over ankle and toe stiffness](landscape.png)",
+                "![Fibre work, effort and distance from people over ankle and toe stiffness](landscape.png)",
                 least_table(least),
-                f"Of {len(walks)} cells somebody falls in {falls}. {' '.join(ways)}",
-                f"{self.what_ran} of each cell. Prices are for a metre where all cells walk equally fast; in brackets "
-                f"the cells that cost at most {100 * NOT_DEARER:g} % more than the least.",
+                f"Of {len(walks)} cells somebody falls in {falls}. From the slowest to the fastest walk the springs of "
+                f"the least become: {'; '.join(ways)}.",
+                f"{self.what_ran} of each cell. Prices are for a metre, and the distance is the angles' rms from "
+                "people's mean, where all cells walk equally fast; in brackets "
+                f"the cells that have at most {100 * NOT_DEARER:g} % more than the least.",
             ]
         )
 
@@ -137,11 +146,13 @@ def _cell_numbers(metrics: Mapping[str, Any], pushed: Mapping[str, Any]) -> dict
     """Return falls, walked speed, prices and RMSE of the joints from the metrics of a cell's undisturbed walk, and the
     falls of its `pushed` one."""
     numbers = price_numbers(metrics)
+    of_joints = {f"{joint}_rmse_deg": metrics["joints"][joint]["rmse_deg"] for joint in COMPARED_JOINTS}
     return {
         "falls": numbers["falls"],
         "falls_pushed": price_numbers(pushed)["falls"],
         **numbers,
-        **{f"{joint}_rmse_deg": metrics["joints"][joint]["rmse_deg"] for joint in COMPARED_JOINTS},
+        **of_joints,
+        DISTANCE: None if None in of_joints.values() else float(np.mean(list(of_joints.values()))),
     }
 
 
@@ -150,19 +161,19 @@ def _count_with_falls(walks: Sequence[Row], column: str) -> int:
     return sum(row[column] > 0 for row in walks)
 
 
-def cheapest(even: Sequence[Row]) -> list[dict[str, Any]]:
-    """Return for each of `TWO_PRICES`, person and walked speed a row with the cheapest of the cells in `even`, rows of
+def cells_of_least(even: Sequence[Row]) -> list[dict[str, Any]]:
+    """Return for each of `SEARCHED`, person and walked speed a row with the cell of the least number in `even`, rows of
     `at_walked_speeds`.
 
-    It has that cell's stiffness of ankle and toe, its price, and the range of each stiffness over the cells that
-    cost at most `NOT_DEARER` more; None where no cell has a price.
+    It has that cell's stiffness of ankle and toe, its number, and the range of each stiffness over the cells that
+    have at most `NOT_DEARER` more; None where no cell has the number.
     """
     rows = []
-    for price in TWO_PRICES:
+    for price in SEARCHED:
         for person, speed in dict.fromkeys((row["person"], row["speed_m_s"]) for row in even):
             here = [row for row in even if (row["person"], row["speed_m_s"]) == (person, speed)]
             walked = [row for row in here if row[price] is not None]
-            row: dict[str, Any] = {"person": person, "speed_m_s": speed, "price": price, "cells": len(walked)}
+            row: dict[str, Any] = {"person": person, "speed_m_s": speed, "number": price, "cells": len(walked)}
             bounds = tuple(f"{column}_{end}" for column in BOTH_STIFFNESSES for end in ("from", "to"))
             row |= dict.fromkeys((*BOTH_STIFFNESSES, "least", *bounds))
             if walked:
@@ -177,51 +188,48 @@ def cheapest(even: Sequence[Row]) -> list[dict[str, Any]]:
 
 
 def least_table(least: Sequence[Row]) -> str:
-    """Return the Markdown table of the cells of least price, a line for each person and walked speed; `least` are rows
-    of `cheapest`."""
+    """Return the Markdown table of the cells of least, a line for each person and walked speed; `least` are rows of
+    `cells_of_least`."""
     lines = []
     for person, speed in dict.fromkeys((row["person"], row["speed_m_s"]) for row in least):
         here = [row for row in least if (row["person"], row["speed_m_s"]) == (person, speed)]
         lines.append([f"{person}, {speed:g} m/s", *(_cell(row) for row in here)])
-    return table(["walking", "least fibre work: ankle, toe, N·m/rad", "least effort: ankle, toe, N·m/rad"], lines)
+    return table(["walking", *(f"least {name}: ankle, toe, N·m/rad" for name in SEARCHED.values())], lines)
 
 
 def _cell(row: Row) -> str:
-    """Return ankle's and toe's stiffness of a row of `cheapest`, each with its range in brackets; a dash if None."""
+    """Return the two stiffnesses of a row of `cells_of_least`, each with its range in brackets; a dash if None."""
     if row["least"] is None:
         return MISSING
     return ", ".join(f"{row[name]:g} ({row[f'{name}_from']:g} to {row[f'{name}_to']:g})" for name in BOTH_STIFFNESSES)
 
 
-def direction(least: Sequence[Row], column: str, price: str) -> str:
-    """Return, in words, in how many pairs of neighbouring walked speeds the stiffness `column` of the least price rises
-    and falls with speed, and for how many persons it rises more often than it falls."""
-    rises = falls = pairs = 0
-    persons = list(dict.fromkeys(row["person"] for row in least))
-    agreeing = 0
-    for person in persons:
-        rows = [row for row in least if (row["person"], row["price"]) == (person, price) and row["least"] is not None]
+def direction(least: Sequence[Row], column: str, number: str) -> str:
+    """Return in words whether the stiffness `column` of the least `number` is stiffer or softer at the fastest walked
+    speed than at the slowest: known if all persons agree and are `AGREEING` or more, else with their counts."""
+    changes = []
+    for person in dict.fromkeys(row["person"] for row in least):
+        rows = [row for row in least if (row["person"], row["number"]) == (person, number) and row["least"] is not None]
         rows.sort(key=lambda row: row["speed_m_s"])
-        steps = [fast[column] - slow[column] for slow, fast in pairwise(rows)]
-        up = sum(step > 0 for step in steps)
-        down = sum(step < 0 for step in steps)
-        rises += up
-        falls += down
-        pairs += len(steps)
-        agreeing += up > down
-    return f"{rises} of {pairs} pairs of speeds ({falls} softer), mostly for {agreeing} of {len(persons)} persons"
+        changes.append(rows[-1][column] - rows[0][column] if rows else 0.0)
+    counts = {"stiffer": sum(change > 0.0 for change in changes), "softer": sum(change < 0.0 for change in changes)}
+    for word, count in counts.items():
+        if count == len(changes) >= AGREEING:
+            return word
+    return f"not known ({counts['stiffer']} stiffer, {counts['softer']} softer)"
 
 
 def draw(path: Path, walks: Sequence[Row], even: Sequence[Row]) -> None:
-    """Draw the mean price over persons: a row of panels for each price, one for each walked speed, with a cross on the
-    cells in which somebody falls."""
+    """Draw the mean over persons: a row of panels for each number of `SEARCHED`, one for each walked speed, with a
+    cross on the cells in which somebody falls."""
     speeds = sorted({row["speed_m_s"] for row in even})
     ankles, toes = (sorted({row[column] for row in even}) for column in BOTH_STIFFNESSES)
     fallen = {tuple(row[column] for column in BOTH_STIFFNESSES) for row in walks if row["falls"]}
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(3.6 * len(speeds), 5.6), layout="constrained")
-        grid = figure.subplots(len(TWO_PRICES), len(speeds), squeeze=False)
-        for axes, price, label in zip(grid, TWO_PRICES, ("fibre work, J/kg/m", "effort, –"), strict=True):
+        figure = Figure(figsize=(3.6 * len(speeds), 2.8 * len(SEARCHED)), layout="constrained")
+        grid = figure.subplots(len(SEARCHED), len(speeds), squeeze=False)
+        units = ("J/kg/m", "–", "°")
+        for axes, (price, name), unit in zip(grid, SEARCHED.items(), units, strict=True):
             for ax, speed in zip(axes, speeds, strict=True):
                 prices = np.full((len(toes), len(ankles)), np.nan)
                 for (row, toe), (column, ankle) in product(enumerate(toes), enumerate(ankles)):
@@ -233,7 +241,7 @@ def draw(path: Path, walks: Sequence[Row], even: Sequence[Row]) -> None:
                     if None not in here:
                         prices[row, column] = np.mean(here)
                 _draw_panel(ax, prices, ankles, toes, fallen)
-                ax.set_title(f"{label}, walking {speed:g} m/s")
+                ax.set_title(f"{name}, {unit}, walking {speed:g} m/s")
         for ax in grid[-1]:
             ax.set_xlabel("ankle, N·m/rad")
         for ax in grid[:, 0]:

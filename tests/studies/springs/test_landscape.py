@@ -6,7 +6,15 @@ import pytest
 
 from springfoot.cli.main import study_main
 from springfoot.studies.feet.walked_speeds import TWO_PRICES
-from springfoot.studies.springs.landscape import ANKLES, NOT_DEARER, TOES, cheapest, direction, least_table
+from springfoot.studies.springs.landscape import (
+    ANKLES,
+    DISTANCE,
+    NOT_DEARER,
+    TOES,
+    cells_of_least,
+    direction,
+    least_table,
+)
 
 FIBRE, EFFORT = TWO_PRICES
 
@@ -21,6 +29,7 @@ def bowl(best_ankle, best_toe, *, speed=1.1, person="one", missing=()):
             "speed_m_s": speed,
             FIBRE: None if (ankle, toe) in missing else 3.0 + abs(ankle - best_ankle) / 500 + abs(toe - best_toe) / 50,
             EFFORT: None if (ankle, toe) in missing else 5.0 - ankle / 1000 - toe / 1000,
+            DISTANCE: None if (ankle, toe) in missing else 2.0,
         }
         for ankle in ANKLES
         for toe in TOES
@@ -28,7 +37,7 @@ def bowl(best_ankle, best_toe, *, speed=1.1, person="one", missing=()):
 
 
 def test_the_cheapest_cell_is_the_one_planted_with_the_cells_near_it():
-    fibre, effort = cheapest(bowl(150.0, 28.0))
+    fibre, effort, _ = cells_of_least(bowl(150.0, 28.0))
     assert (fibre["ankle_N_m_rad"], fibre["toe_N_m_rad"], fibre["least"]) == (150.0, 28.0, 3.0)
     # 3 J/kg/m and NOT_DEARER of it reach as far as 75 N m/rad of the ankle alone; no other toe lies within 7.5 N m/rad.
     assert pytest.approx(75) == 500 * 3.0 * NOT_DEARER
@@ -38,24 +47,33 @@ def test_the_cheapest_cell_is_the_one_planted_with_the_cells_near_it():
 
 
 def test_a_cell_that_falls_is_not_the_cheapest_and_a_map_of_falls_has_none():
-    (fibre, _) = cheapest(bowl(150.0, 28.0, missing={(150.0, 28.0)}))
+    fibre, *_ = cells_of_least(bowl(150.0, 28.0, missing={(150.0, 28.0)}))
     assert fibre["ankle_N_m_rad"] in (100.0, 200.0) and fibre["cells"] == len(ANKLES) * len(TOES) - 1
     everywhere = {(ankle, toe) for ankle in ANKLES for toe in TOES}
-    rows = cheapest(bowl(150.0, 28.0, missing=everywhere))
+    rows = cells_of_least(bowl(150.0, 28.0, missing=everywhere))
     assert {row["least"] for row in rows} == {None}
-    assert "| one, 1.1 m/s | – | – |" in least_table(rows)
+    assert "| one, 1.1 m/s | – | – | – |" in least_table(rows)
 
 
-def test_directions_have_their_sign_and_count_persons():
+@pytest.mark.parametrize(
+    ("fastest", "ankle"),
+    [
+        ((200.0, 150.0, 200.0), "stiffer"),
+        ((50.0, 50.0, 50.0), "softer"),
+        ((200.0, 150.0, 100.0), "not known (2 stiffer, 0 softer)"),
+        ((200.0, 150.0), "not known (2 stiffer, 0 softer)"),
+    ],
+)
+def test_a_direction_is_known_if_persons_agree(fastest, ankle):
     even = [
         row
-        for person, ankles in (("one", (100.0, 150.0, 200.0)), ("two", (200.0, 150.0, 150.0)))
-        for ankle, speed in zip(ankles, (0.9, 1.1, 1.3), strict=True)
-        for row in bowl(ankle, 28.0, speed=speed, person=person)
+        for number, best in enumerate(fastest)
+        for speed, k in ((0.9, 100.0), (1.1, 400.0), (1.3, best))
+        for row in bowl(k, 28.0, speed=speed, person=f"{number}")
     ]
-    least = cheapest(even)
-    assert direction(least, "ankle_N_m_rad", FIBRE) == "2 of 4 pairs of speeds (1 softer), mostly for 1 of 2 persons"
-    assert direction(least, "toe_N_m_rad", FIBRE) == "0 of 4 pairs of speeds (0 softer), mostly for 0 of 2 persons"
+    least = cells_of_least(even)
+    assert direction(least, "ankle_N_m_rad", FIBRE) == ankle
+    assert direction(least, "toe_N_m_rad", FIBRE) == "not known (0 stiffer, 0 softer)"
 
 
 @pytest.mark.slow

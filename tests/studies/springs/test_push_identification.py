@@ -29,8 +29,11 @@ def pushed(name, episodes=32, **given):
 
 def errors_of_springs(rows: list[Row]) -> dict[tuple[str, float], float]:
     """Joint and beginning of each loaded phase that is called a spring -> error of its K, as a share."""
-    springs = [row for row in loaded(rows) if row.pushed.verdict == SPRING and row.pushed.stiffness]
-    return {(row.joint, row.start): row.pushed.stiffness.value / row.applied[0] - 1.0 for row in springs}
+    return {
+        (row.joint, row.start): row.pushed.stiffness.value / row.applied[0] - 1.0
+        for row in loaded(rows)
+        if row.pushed.verdict == SPRING and row.pushed.stiffness
+    }
 
 
 def loaded(rows: list[Row]) -> list[Row]:
