@@ -14,6 +14,7 @@ from springfoot.arrays import NDArray
 from springfoot.envs.batch import Biped
 from springfoot.evaluation.numbers import measure
 from springfoot.evaluation.recording import Episodes, Recording, planned_course, policy_and_settings, record_walk
+from springfoot.gait.body import ANKLE_TENDON
 
 from ..base.columns import COMPARED_JOINTS
 from ..base.kept import Kept, known_as
@@ -168,8 +169,9 @@ class PersonsSearch:
 
 @lru_cache(maxsize=8)
 def _batch(person: str, seconds: float, condition: Condition, count: int, threads: int) -> Biped:
-    """Return `count` environments with the person and the condition, cached: reset them before each use."""
-    given = {"person": person, "episode_seconds": seconds, **condition._asdict()}
+    """Return `count` environments with the person and the condition, cached: reset them before each use. The ankle's K
+    is at most that of its tendon, as when the person learned."""
+    given = {"person": person, "episode_seconds": seconds, "ankle_tendon": ANKLE_TENDON, **condition._asdict()}
     _, settings = policy_and_settings("constant", given)
     return Biped(settings, count, threads)
 

@@ -17,12 +17,14 @@ from springfoot.arrays import NDArray
 from springfoot.envs.control import action_of
 from springfoot.envs.settings import BipedSettings, body_of, reference_gait
 from springfoot.envs.task import PERSON_OBSERVATION
-from springfoot.gait.body import TOE_STIFFNESS
+from springfoot.gait.body import ANKLE_TENDON, TOE_STIFFNESS
 from springfoot.gait.springs import ankle_events, toe_events
 
 CENTRE = (250.0, TOE_STIFFNESS)
 """Stiffness of ankle and toe [N m/rad] for 1.70 m and 63 kg at vectors of 0: chosen, with it the package's person walks
 1.20 m/s; people's toe."""
+RANGES = ((BipedSettings().ankle_stiffness_range[0], ANKLE_TENDON), BipedSettings().toe_stiffness_range)
+"""Least and largest K of ankle and toe [N m/rad]; the ankle's largest is that of the tendon in series."""
 LONGEST_PART = 0.1
 """Longest part of the stride with one K in open loop; chosen: five decisions of 20 ms."""
 ERRORS = {"speed_error": 0.05, "com_x_error": 0.05, "com_z_error": 0.02}
@@ -88,11 +90,10 @@ class StiffnessClass:
 
     def stiffness(self, vector: ArrayLike, phase: NDArray) -> NDArray:
         """Return ankle's and toe's K (n, 2) [N m/rad] of one vector at stride phases (n,), for 1.70 m and 63 kg and
-        without errors."""
+        without errors, within `RANGES`."""
         ankle, toe, _ = self.split(vector)
-        return np.array(CENTRE) * np.exp(
-            np.stack([ankle[_part_index(self.ankle, phase)], toe[_part_index(self.toe, phase)]], -1)
-        )
+        parts = np.stack([ankle[_part_index(self.ankle, phase)], toe[_part_index(self.toe, phase)]], -1)
+        return np.clip(np.array(CENTRE) * np.exp(parts), *np.transpose(RANGES))
 
 
 def widened(vector: ArrayLike, inner: StiffnessClass, outer: StiffnessClass) -> NDArray:

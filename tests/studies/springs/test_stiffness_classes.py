@@ -103,3 +103,9 @@ def test_stiffness_stays_within_the_bounds_of_the_settings():
     actions = CLASSES[0].policy(vectors, SETTINGS)(observations(2)).reshape(2, 2, 2)
     np.testing.assert_allclose(stiffness_of(actions[0], SETTINGS, body_of(SETTINGS)), [high, high], rtol=1e-6)
     np.testing.assert_allclose(stiffness_of(actions[1], SETTINGS, body_of(SETTINGS)), [low, low], rtol=1e-6)
+
+
+def test_the_ankle_is_no_stiffer_than_its_tendon():
+    constant, *_ = nested_classes(BipedSettings())
+    assert constant.stiffness([9.0, 9.0], np.zeros(1)).tolist() == [[400.0, 200.0]]
+    assert constant.stiffness([-9.0, -9.0], np.zeros(1)).tolist() == [[20.0, 5.0]]
