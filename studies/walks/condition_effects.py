@@ -38,6 +38,12 @@ def change(name: str, of: Any, against: Any) -> Effect:
     return lambda measured: 100.0 * (measured[of][name] / measured[against][name] - 1.0)
 
 
+def share(name: str, whole: str, of: Any, against: Any) -> Effect:
+    """Return the effect: the change of the number `name` from the condition `against` to the condition `of`, in percent
+    of the number `whole` under `against`."""
+    return lambda measured: 100.0 * (measured[of][name] - measured[against][name]) / measured[against][whole]
+
+
 def per_unit(name: str, at: Mapping[Any, float], factor: float = 1.0) -> Effect:
     """Return the effect: the slope (`slope`) of `factor` times the number `name` over conditions.
 

@@ -158,6 +158,19 @@ def test_a_range_is_of_each_calf_and_a_saving_obeys_its_clause():
     assert "less at 250 than at 50: no" in saving(0.90)["note"]
 
 
+def test_the_saving_of_a_spring_is_told_joint_by_joint():
+    numbers = {0.0: (2.0, 1.0), 50.0: (1.7, 1.2)}  # ankle and knee [J/kg/m]
+
+    def prices(k, *_):
+        ankle, knee = numbers.get(k, (2.0, 1.0))
+        joints = {"ankle": ankle, "knee": knee, "hip": 1.0, "toe": 0.0}
+        return {f"fibre_{joint}_J_kg_m": price for joint, price in joints.items()} | {FIBRE: sum(joints.values())}
+
+    row = row_of("exo_saving", {"one": planted("exo_saving", prices)})
+    assert row["measured"] == pytest.approx(-2.5)
+    assert row["beside"].endswith("of it hip 0; of it knee 5; of it ankle −7.5; of it toe 0")
+
+
 def test_falls_are_told_left_out_in_pairs_and_a_condition_in_which_all_fall_is_a_miss():
     def numbers(condition, speed, episode):
         return {"right_forward_bw": {"sound": 0.2, "stay": 0.1 if episode else 0.9}[condition]}
