@@ -6,7 +6,7 @@ For each seed two trainings of one task, in which the policy moves the legs and 
 for the work of its fibres (`fibre_work`). Of the walks of both are measured the reading, which is that term, and the
 truth: the energy of every physics step with the muscles' smooth force. Both stand over the commanded way, over which a
 slower walk is cheaper, whatever the price: so both trainings are charged for a speed that is not held, too. A learner
-whose reading hardly falls has not tried to cheat, and decides nothing. The old term `effort` is told beside.
+with a reading that hardly falls has not tried to cheat, and decides nothing. The old term `effort` is told beside.
 """
 
 import sys
@@ -51,7 +51,7 @@ class Cheating:
     timesteps: int = 500_000
     """Steps of each training."""
     acts: Acts = "both"
-    """What the policy acts on."""
+    """Part that the policy acts on."""
     charge: float = -2.0
     """Weight of `fibre_work`."""
     held: float = -10.0

@@ -19,7 +19,7 @@ from typing import Any
 FOLDER = "EXECUTED_LINES"
 """Environment variable: the folder that takes one JSON file a process."""
 REPOSITORY = "EXECUTED_LINES_OF"
-"""Environment variable: the repository whose lines count."""
+"""Environment variable: the repository with the lines that count."""
 
 
 def start() -> None:

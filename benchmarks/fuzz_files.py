@@ -52,7 +52,7 @@ class Reader:
     """A way to read files."""
 
     read: Callable[[Path], Any]
-    """Reads one and uses what it read, or raises `SpringfootError`."""
+    """Reads one and uses its content, or raises `SpringfootError`."""
     suffix: str
     """Ending of its files' names."""
     bases: tuple[bytes, ...]

@@ -3,7 +3,7 @@
     python -m benchmarks.fuzz_readers --seconds 600
 
 `make fuzz` does this; the tests do it for 6 s. Bases are without digests, so that changes reach the code behind them.
-Memory is that of this process at its peak beyond what it had when the files were made.
+Memory is that of this process at its peak, beyond its memory when the files were made.
 """
 
 import json

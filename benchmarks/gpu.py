@@ -25,7 +25,7 @@ from springfoot.gait.body.body import GRAVITY, Body
 from .walking import Walk, record_walk
 
 RECORDED = 64
-"""Bodies whose walk is repeated until there are N."""
+"""Bodies; their walk is repeated until there are N."""
 CONTACTS, ROWS = 8, 64
 """Room for contacts and constraint rows of each body: six spheres, three rows each, and the joint stops."""
 

@@ -50,7 +50,7 @@ class Learner:
 
     name: str
     packages: tuple[str, ...]
-    """Packages whose versions are told."""
+    """Packages told with their versions."""
     example: str
     flags: tuple[str, ...] = ()
     timesteps: int = 131_072

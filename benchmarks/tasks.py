@@ -3,7 +3,7 @@
     make benchmark
 
 Each is submitted and judged once, in benchmarks/submissions; the same command goes on after a stop. The best constant
-springs are chosen from `ANKLES` x `TOES` by 24 episodes whose seeds no submission has.
+springs are chosen from `ANKLES` x `TOES` by 24 episodes with seeds that no submission has.
 """
 
 import argparse

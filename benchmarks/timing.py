@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 PACKAGES = ("springfoot", "mujoco", "numpy", "gymnasium", "stable-baselines3", "torch", "numba", "envpool")
-"""Packages whose versions decide the figures."""
+"""Packages that decide the figures by their versions."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,7 +32,7 @@ class Case:
     close: Callable[[], object] = lambda: None
     """After the last block."""
     workers: Sequence[int] = ()
-    """Process ids whose CPU time counts too."""
+    """Process ids; their CPU time counts too."""
 
 
 @dataclass(frozen=True, kw_only=True)

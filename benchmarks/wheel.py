@@ -3,7 +3,7 @@
     make test-wheel
 
 Short: the checkers of Gymnasium and stable-baselines3, every policy of the package, README's Python and commands, and
-the copied examples whose libraries are installed. In programs of our own a warning is an error.
+the copied examples with installed libraries. In programs of our own a warning is an error.
 """
 
 import re

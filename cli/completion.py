@@ -46,7 +46,7 @@ complete -o default -F _springfoot springfoot
 def completion_main(arguments: Sequence[str], installed_studies: Callable[[], dict[str, Any]]) -> int:
     """Print the completion of all commands and flags for a shell; return 0, and 2 for another word.
 
-    `installed_studies` returns name -> class of the studies whose packages are installed.
+    `installed_studies` returns name -> class of the studies with installed packages.
     """
     match arguments:
         case ["-h" | "--help"]:

@@ -17,7 +17,7 @@ from springfoot.files.markdown import table
 class JudgeFlags:
     """Repeat submissions, and walk each on seeds and bodies drawn from its policy's digest.
 
-    A submission whose numbers repeat gets judged.json, with which it may enter the leaderboard.
+    A submission with numbers that repeat gets judged.json, with which it may enter the leaderboard.
     """
 
     folders: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="FOLDER ...")]

@@ -221,7 +221,7 @@ def study_class(name: str) -> "type[Study]":
 
 
 def _installed_studies() -> "dict[str, type[Study]]":
-    """Return name -> class of the studies whose packages are installed."""
+    """Return name -> class of the studies with installed packages."""
     classes = {}
     for name in STUDIES:
         try:

@@ -19,7 +19,7 @@ from springfoot.studies.base.flags import given, optional_flags
 from springfoot.tasks import MAY_NAME_FILES, MUST_AGREE
 
 PRESET = PRESETS["walk"]
-"""Preset whose values the help shows as defaults."""
+"""Preset with the values that the help shows as defaults."""
 ENGINES = Literal["sb3", "rllib"]
 RESUMED = {"timesteps", "threads", "device", "reward_weights"}
 """Settings that may change when a run is continued."""
@@ -43,7 +43,7 @@ class TrainFlags:
     other random numbers. --timesteps then counts further steps; --threads, --device and --reward-weights may be
     changed."""
     begin_from: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER|POLICY", help_behavior_hint="")] = None
-    """Folder of a run, or a policy (`learned`, a file), whose network the training begins with, in place of an
+    """Folder of a run, or a policy (`learned`, a file): the training begins with its network in place of an
     untrained one, as to adapt a person to one foot; the task may be another, observations and actions not."""
     seeds: Annotated[int | None, tyro.conf.arg(metavar="INT", help_behavior_hint="")] = None
     """Train from so many seeds at once, --seed and the next ones: one process a processor, one thread each, one
@@ -51,7 +51,7 @@ class TrainFlags:
     preset: Literal["walk", "any-body", "predict", "person"] = "walk"
     """Training that is known to work, which the other flags change. walk: one body at one speed. any-body: people of
     1.45-2.00 m and 40-120 kg at 0.8-1.6 m/s, drawn anew for each episode, with speeds that change within it. predict:
-    one body that follows its own plan, no curve of people's. person: a person who walks on any foot."""
+    one body that follows its own plan, no curve of people's. person: a person that walks on any foot."""
     task: Annotated[str | None, tyro.conf.arg(metavar="TASK", help_behavior_hint="")] = None
     """Frozen task of the benchmark, such as Walk-v0 (docs/how-to/benchmark.md), in place of a preset."""
     engine: ENGINES = "sb3"
@@ -141,7 +141,7 @@ def run_training(flags: TrainFlags) -> int:
 
 
 def next_lines(record: dict[str, Any], folder: Path) -> list[str]:
-    """Return the lines with the next commands after a training into `folder`, whose run.json is `record`."""
+    """Return the lines with the next commands after a training into `folder`; `record` is its run.json."""
     from springfoot.agents.training.run_record import evaluations_of_one_task
 
     environment = record["config"]["environment"]

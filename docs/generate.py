@@ -46,7 +46,7 @@ def _rows(dataclass: Any, names: list[str] | None = None) -> Iterator[tuple[str,
 
 
 def _names(head: list[str], rows: list[tuple[str, ...]]) -> str:
-    """Return a table whose first column keeps its names whole, as docs/site.css says."""
+    """Return a table with whole names in its first column, as docs/site.css says."""
     return f'<div class="names" markdown>\n\n{table(head, rows)}\n\n</div>'
 
 

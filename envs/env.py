@@ -42,8 +42,8 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
 
     With `acts="person"` the action is the person instead, `Box(-1, 1, (6,), float32)`: offsets to the rest angles of
     hips, knees and ankles, up to `person_range_deg` each: `rest_hip_left`, `rest_knee_left`, `rest_ankle_left`, then
-    those of the right leg. With `acts="both"` these six stand behind the four. `stiffness_by` says who sets the
-    stiffness; where the action does not, its four are read and seen as 0.
+    those of the right leg. With `acts="both"` these six stand behind the four. `stiffness_by` tells the source of
+    the stiffness; where that is not the action, the action's four are read and seen as 0.
 
     ## Feet
     `left_foot` and `right_foot` are each one of these kinds, or a dictionary of `kind` and numbers. Stiffness [N m/rad]
@@ -151,7 +151,7 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
     | activation_rate | 0     | squared rate of the activation x 50 ms, weighted by volume                      |
 
     In `stiffness` K is of muscles, and of an adaptive device. With `ankle_tendon` K_ankle is that of the calf's
-    fibres, beyond what they have at rest and by their torque.
+    fibres, beyond their K at rest and by their torque.
 
     ## Starting state
     People's posture at a random phase of single support (0.08 to 0.38 of either leg's stride), or at `start`, moving at
@@ -240,10 +240,10 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
     | `schedule`                | `None`          | a stiffness schedule in JSON form                                  |
     | **person**                |                 |                                                                    |
     | `acts`                    | `"stiffness"`   | the action sets `"stiffness"`, the `"person"`, or `"both"`         |
-    | `person`                  | `None`          | who walks there: the guide's own, `"tuned"`, a person, or a file   |
+    | `person`                  | `None`          | walker there: the guide's own, `"tuned"`, a person, or a file      |
     | `person_range_deg`        | `14.0`          | largest offset of a rest angle [deg]                               |
     | `aim_rate`                | `0.0`           | how fast a person aims at the speed it lacks [1/s]                 |
-    | `stiffness_by`            | `"action"`      | who sets the stiffness where the action moves the person           |
+    | `stiffness_by`            | `"action"`      | source of the stiffness where the action moves the person          |
     | **episode**               |                 |                                                                    |
     | `episode_seconds`         | `20.0`          | time until truncation [s]                                          |
     | `start`                   | `"random"`      | left leg's stride phase at the start, `"random"` or `"standing"`   |
@@ -314,7 +314,8 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
         return self.biped.observe()[0], _info(values[0], termination=0)
 
     def step(self, action: NDArray) -> tuple[NDArray, float, bool, bool, dict[str, Any]]:
-        """Hold what `action` (A,) sets, by default stiffness of ankles and toes, during a step, by default 20 ms."""
+        """Hold the values set by `action` (A,), by default stiffness of ankles and toes, during a step,
+        by default 20 ms."""
         if self._over:
             raise SpringfootError("no episode is running: call reset() before step()")
         action = real_numbers("action", action)

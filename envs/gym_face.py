@@ -41,7 +41,7 @@ class Face:
     def spec(self, spec: EnvSpec | None) -> None:
         """Keep a copy of the spec, with the settings' `max_episode_steps`: they alone truncate this environment.
 
-        A limit given to `gym.make` is kept by a wrapper, `TimeLimit`, whose own spec names it.
+        A limit given to `gym.make` is kept by a wrapper, `TimeLimit`; its own spec names the limit.
         """
         self._spec = copy(spec)
         if self._spec is not None:

@@ -108,7 +108,7 @@ class SegmentedFootBipedVector(  # pyright: ignore[reportIncompatibleVariableOve
     def step(self, actions: NDArray) -> tuple[NDArray, NDArray, NDArray, NDArray, dict[str, Any]]:
         """Hold the values set by `actions` (N, A), the stiffnesses by default, during a step, 20 ms by default.
 
-        Environments whose episode is over are reset as `autoreset_mode` says: in this step in place of a step of their
+        Environments with an ended episode are reset as `autoreset_mode` says: in this step in place of a step of their
         own, or with "SameStep" at the end of the step in which it ends.
         """
         self._check_running()

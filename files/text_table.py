@@ -142,8 +142,8 @@ def has_content(path: Path, content: bytes) -> bool:
 def read_csv(path: Path) -> Table:
     """Read a CSV file: a header, then rows of as many cells. Raises `SpringfootError` for any other file.
 
-    Cells are separated by commas; in a file whose header has none, by semicolons or tabs, and its numbers may then have
-    decimal commas.
+    Cells are separated by commas; in a file without commas in its header, by semicolons or tabs, and its numbers may
+    then have decimal commas.
     """
     lines = text_lines(path)
     head = []  # up to the line of names

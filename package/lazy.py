@@ -8,7 +8,7 @@ from .extras import naming_extras
 
 
 def lazy_names(package: str, modules: Mapping[str, str]) -> Callable[[str], Any]:
-    """Return the `__getattr__` of a package whose public names come from its modules.
+    """Return the `__getattr__` of a package with public names that come from its modules.
 
     Args:
         package: the package's `__name__`.

@@ -93,4 +93,4 @@ PERSONS_SHA256 = {
     "learned": "941daa201a21a8ab9d48eedc887a3a03b57ea9b199b17ea061c9735dae6d0f5f",
     "predicted": "bf5418a4915daadcd14d5812b0961233e32d04436b32df3e3cb0f0eb19268141",
 }
-"""Person who walks on the v0 of the tasks -> digest of the file."""
+"""Person that walks on the v0 of the tasks -> digest of the file."""

@@ -87,7 +87,7 @@ def schedule(settings: BipedSettings, factor: float = 1.0) -> PolicyFunction:
 
 
 def quasi_stiffness(settings: BipedSettings) -> PolicyFunction:
-    """Return the policy whose K is people's ankle quasi-stiffness over the stride (`REFERENCE_STIFFNESS`), and
+    """Return the policy with people's ankle quasi-stiffness over the stride as its K (`REFERENCE_STIFFNESS`), and
     `TOE_STIFFNESS` at the toes; the same at every speed, scaled with the body."""
     body = body_of(settings)
     ankle = plateau_curve(REFERENCE_STIFFNESS)

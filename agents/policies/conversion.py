@@ -54,7 +54,7 @@ def policy_from_mlp(
         activation: function between the layers: tanh, relu, leaky_relu (slope 0.01), elu (alpha 1) or silu.
         output: function that bounds the last layer's output to [-1, 1]: clip (as PPO) or tanh (as SAC).
         observation_mean: (D,) mean subtracted from observations in training; None if they were not normalised.
-        observation_variance: (D,) variance whose root divided observations in training.
+        observation_variance: (D,) variance; its root divided observations in training.
         observation_clip: largest magnitude of a normalised observation; None for no limit.
         variance_floor: added to the variance before the root.
         mirrored: True if the layers lead to the actions of the left leg alone, (2,): the policy takes those of the

@@ -117,7 +117,7 @@ def scale_of(settings: BipedSettings) -> Scale | None:
 
 
 def two_floats(value: NDArray) -> tuple[NDArray, NDArray]:
-    """Return two float32 arrays whose sum is the float64 `value` to twice float32's precision.
+    """Return two float32 arrays with the float64 `value` as their sum, to twice float32's precision.
 
     float32 alone is too coarse: an observation's mean can be 1,000 times its standard deviation.
     """

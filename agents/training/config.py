@@ -161,7 +161,7 @@ DRAWN_BODIES = [
 """Proportions, loads and step times that a person learns to walk with."""
 PERSON_TASK = replace(
     TRAINED_ON,
-    episode_seconds=5.0,  # bodies fall soon after the start or not at all, so starts are what has to be learned
+    episode_seconds=5.0,  # bodies fall soon after the start or not at all, so starts are the thing to learn
     drawn_feet=DRAWN_FEET,
     drawn_bodies=DRAWN_BODIES,
     acts="both",
@@ -177,7 +177,7 @@ PERSON_TASK = replace(
     slope_range_deg=(-5.0, 5.0),
     unevenness_m=0.005,
     reward_weights={
-        "alive": 58.0,  # about what all prices take at first: with less it learns to fall
+        "alive": 58.0,  # about as much as all prices take at first: with less it learns to fall
         "speed": 0.5,
         "com_x": 0.2,
         "com_z": 0.0,
@@ -215,7 +215,7 @@ PREDICTED = replace(
     slope_range_deg=(-5.0, 5.0),
     unevenness_m=0.01,
     reward_weights={
-        "alive": 180.0,  # about what all prices take at first: with less it learns to fall
+        "alive": 180.0,  # about as much as all prices take at first: with less it learns to fall
         "speed": 10.0,
         "com_x": 10.0,
         "com_z": 6.0,
@@ -243,7 +243,7 @@ _PERSON = TrainingConfig(
     update_steps=15_360,
     minibatches=12,
     epochs=5,
-    learning_rate_end=0.02,  # when the spread of actions is small a high rate undoes what was learned
+    learning_rate_end=0.02,  # when the spread of actions is small a high rate undoes earlier learning
     gamma=0.99,
     log_std=-1.2,
     hidden=(256, 256),

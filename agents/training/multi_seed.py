@@ -116,8 +116,7 @@ def _status(rows: Sequence[dict[str, Any]], signalled: signal.Signals | None) ->
 
 
 def train_missing(jobs: Sequence[tuple[TrainingConfig, Path, str]], engine: Engine = "here") -> str:
-    """Train those of the jobs (configuration, folder, name) whose folder holds no finished run; continue unfinished
-    runs.
+    """Train the jobs (configuration, folder, name) without a finished run in their folder; continue unfinished runs.
 
     Returns the status of all: `finished`, `failed` or `interrupted`. Raises `SpringfootError`, with nothing changed,
     if a folder holds a run of another configuration.

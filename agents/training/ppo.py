@@ -38,7 +38,7 @@ def _learning_rate(config: TrainingConfig, left: float) -> float:
 
 
 class _CriticFirstPPO(PPO):
-    """stable-baselines3's PPO, whose actor and exploration stay as they are in the first `critic_steps` steps."""
+    """stable-baselines3's PPO; its actor and exploration stay as they are in the first `critic_steps` steps."""
 
     critic_steps = 0
 

@@ -48,7 +48,7 @@ class Learning(TypedDict):
     updates: int
     """Gradient epochs so far, as stable-baselines3 counts them."""
     episodes: list[Episode]
-    """Latest episodes, whose mean return is rollout/ep_rew_mean."""
+    """Latest episodes; their mean return is rollout/ep_rew_mean."""
     logged: dict[str, list[Any]]
     """Value and excluded formats of each unwritten number of the logger; texts and figures are not kept."""
 

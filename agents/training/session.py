@@ -36,7 +36,7 @@ from .signals import Stopping
 from .training_log import log_configuration, without_writer_tracebacks
 
 PACKAGES = ("springfoot", "mujoco", "gymnasium", "numpy", "scipy", "torch", "stable-baselines3")
-"""Packages whose versions decide the result of a training."""
+"""Packages that decide the result of a training by their versions."""
 CHECKPOINT_TIME_FRACTION = 0.02
 """Largest fraction of the wall time that checkpoints between two evaluations may take; chosen."""
 LEARNED_ARRAYS = ("network.", "observation.", "return.")

@@ -83,7 +83,7 @@ def resume(
         device: processor of the network from here on, in place of the saved one.
 
     Starts from the newest whole checkpoint, and ends with the bits of an uninterrupted run, on the same versions and a
-    processor of the same instructions; not on a GPU, whose random numbers begin anew. Completes whatever an earlier end
+    processor of the same instructions; not on a GPU, where random numbers begin anew. Completes whatever an earlier end
     left unfinished in the folder. Raises `SpringfootError` for a folder without a run, and for a run that is finished,
     that another process writes, or that this version cannot continue.
     """

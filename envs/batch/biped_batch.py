@@ -1,4 +1,4 @@
-"""Step N walking bodies whose actions are ankle and toe stiffness; the Gymnasium environments stand on this batch.
+"""Step N walking bodies with actions of ankle and toe stiffness; the Gymnasium environments stand on this batch.
 
 One step lasts 20 ms, or as the setting `decisions` says. The action sets the stiffness, which is held for all control
 windows of 10 ms in the step; in each window the springs' rest angles, the hips and the knees follow the phase. Row i of
@@ -401,7 +401,7 @@ class Biped(ExactState):
 
     def _move_person(self, step: "_Step", window: int, seen: NDArray | None) -> None:
         """Move the rest angles of hips, knees and ankles before control window number `window` of the step: by the
-        action at the step's beginning, or by a learned person every 20 ms, who has `seen` an observation."""
+        action at the step's beginning, or, every 20 ms, by a learned person that has `seen` an observation."""
         resting = step.running & ~step.walking
         if step.of_person is not None:
             self._person.move(self._person.offsets(step.of_person), step.walking, resting)

@@ -110,7 +110,7 @@ def _act(observation, acting, mean, deviation, clip, index, sign, weights, biase
 
 
 class LegNetwork:
-    """A mirrored network of tanh layers whose outputs, clipped to [-1, 1], are the actions of a leg.
+    """A mirrored network of tanh layers; its outputs, clipped to [-1, 1], are the actions of a leg.
 
     Args:
         mean, deviation: (D,) of the observations in training; no deviation is 0.

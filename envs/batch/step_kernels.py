@@ -65,7 +65,7 @@ def end_window(controls, physics, forces, window, walking) -> None:
         physics: `Physics` of the simulation, as a plain tuple.
         forces: (W, N, side, contact, 2) contact forces in the step's W windows [N].
         window: number of the control window in the step, from 0.
-        walking: (N,) bool, environments whose phase moves: bodies that neither stand nor have ended.
+        walking: (N,) bool, environments with a phase that moves: bodies that neither stand nor have ended.
     """
     physics = Physics(*physics)
     bodies = physics.bodies

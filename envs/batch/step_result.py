@@ -138,8 +138,8 @@ class Tick:
 def stiffness_and_rest(control: NDArray, slack: NDArray) -> dict[str, NDArray]:
     """Return the fields `stiffness` and `equilibrium` of a `Tick`, K [N m/rad] and theta_eq [rad] of each joint.
 
-    `control` is (N, side, joint, 2), K [N m/rad] and K theta_eq [N m], `slack` (N, side) 1 for an ankle whose muscles
-    are slack: its K is reported as 0, though its tissue has some. Where K is 0, theta_eq is 0.
+    `control` is (N, side, joint, 2), K [N m/rad] and K theta_eq [N m], `slack` (N, side) 1 for an ankle with slack
+    muscles: its K is reported as 0, though its tissue has some. Where K is 0, theta_eq is 0.
     """
     stiffness, drive = np.moveaxis(control, -1, 0)
     stiffness = stiffness.copy()

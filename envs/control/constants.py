@@ -207,7 +207,7 @@ def _file() -> dict[str, dict]:
 
 
 def generic_constants() -> LegConstants:
-    """Return leg constants without tuning: searches begin at them, and so do persons who follow the plan.
+    """Return leg constants without tuning: searches begin at them, and so do persons that follow the plan.
 
     No curve is corrected, all moments are fed forward, springs are equally stiff at every phase, and the trunk is
     upright.

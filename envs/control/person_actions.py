@@ -21,7 +21,7 @@ FARTHEST_AIM = 0.2
 
 @part
 def move_aim(controls, bodies, seconds, walking, running) -> None:
-    """Move the speed that each person aims at by what its CoM lacked of the commanded speed in a step.
+    """Move the speed that each person aims at by its CoM's shortfall from the commanded speed in a step.
 
     Args:
         controls: (N,) of `CONTROL_ROW`; `person` is changed.

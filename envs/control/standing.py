@@ -222,7 +222,7 @@ class Standing:
         return scheduled | (running & (mode == WALKING)), scheduled
 
     def _begin_modes(self, before: NDArray, m: Measurement) -> None:
-        """Begin the new mode of each body whose mode was another one `before` (N,).
+        """Begin the new mode of each body with another mode `before` (N,).
 
         Bodies that set off or stop get their commanded speed; those that have stopped get springs that hold them as
         they are, `m` being measured now.

@@ -76,7 +76,7 @@ SPRING_STATE = np.dtype(
         ("equilibrium", float, FEET),  # rest angle [rad]
         ("work_stiffness", float, FEET),  # done by the last change of stiffness [J]
         ("work_equilibrium", float, FEET),  # done by moving the rest angle since that change [J]
-        ("rest_phase", float, len(SIDES)),  # stride phases whose rest angle holds
+        ("rest_phase", float, len(SIDES)),  # stride phases of the rest angles that hold
         ("fresh", np.int64),  # 1 until the first window of an episode: setting the springs then does no work
         ("delay", np.int64),  # control windows from the request of a stiffness until it acts
         ("requests", float, (1 + round(LONGEST_DELAY / CONTROL_WINDOW), *FEET)),  # in the last windows, newest first

@@ -389,7 +389,7 @@ class FootSprings:
         return new_lines
 
     def reset(self, ids: NDArray, delay: ArrayLike = 0) -> None:
-        """Begin an episode of springs `ids` (K,), whose muscles are taut.
+        """Begin an episode of springs `ids` (K,), with taut muscles.
 
         Their next stiffness does no work and has no delay, as if it had been requested long before. Later ones take
         effect `delay` (K,) control windows after their request.

@@ -58,7 +58,7 @@ class StiffnessSource:
             self._source[index] = draw_source(self._settings, random)
 
     def replace_factors(self, factor: NDArray, at_one: NDArray, running: NDArray, randoms: Sequence) -> None:
-        """Replace the factors on the stiffness of the bodies whose source is not the action.
+        """Replace the factors on the stiffness of the bodies with another source than the action.
 
         Args:
             factor: (N, 4) factors of the actions on the stiffness [-], changed in place.

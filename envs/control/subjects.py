@@ -65,7 +65,7 @@ def _find_places(ids, speeds, first, subjects):
         weight = 0.0
         if last > 0:
             weight = min(max((equal_speed - speeds[lower]) / (speeds[lower + 1] - speeds[lower]), 0.0), 1.0)
-        if weight == 1.0:  # at the next speed itself, whose row alone is then read
+        if weight == 1.0:  # at the next speed itself: its row alone is then read
             lower = lower + 1
             weight = 0.0
         subjects[i].place.row = first[i] + lower
@@ -132,7 +132,7 @@ class Subjects:
             randoms: K generators.
             given: name of `GIVEN` -> values (K,) in place of drawn ones; feet among them are not read (`WornFeet`).
 
-        Returns the indices of environments with a changed body, whose model must be rebuilt. Raises `SpringfootError`,
+        Returns the indices of environments with a changed body; their models must be rebuilt. Raises `SpringfootError`,
         leaving all state unchanged, for an impossible body or a speed outside the tables.
         """
         numbers = {name: values for name, values in (given or {}).items() if name not in FOOT_SETTINGS}

@@ -37,8 +37,8 @@ LEDGER = np.dtype(
 """Energies of one window of one body [J], both legs together, into the body positive; `mechanical` is a state, all
 others are work.
 
-mechanical rises by actuators + passive_damping + contact + pushes. Every joint is a spring whose K and theta_eq change
-between windows (not before an episode's first), so the actuators' work comes from stiffness_changes +
+mechanical rises by actuators + passive_damping + contact + pushes. Every joint is a spring with K and theta_eq that
+change between windows (not before an episode's first), so the actuators' work comes from stiffness_changes +
 equilibrium_changes + spring_damping and from the energy stored in the springs. That sum agrees to 3 % of the energy put
 in: MuJoCo moves a joint by the velocity after a step.
 """
@@ -183,8 +183,8 @@ def _sum_changes(parts, control, control_before, angle, energy):
             for joint in range(4):
                 k = control[i, side, joint, 0]
                 k_before = control_before[i, side, joint, 0]
-                # Not at the start of an episode (NaN is not > 0), without a spring, or for a foot whose torque is a
-                # table of the angle.
+                # Not at the start of an episode (NaN is not > 0), without a spring, or for a foot with a
+                # table of torque over the angle.
                 if k + k_before > 0.0 and not parts[i].table[side, joint]:
                     rest = control[i, side, joint, 1] / k
                     rest_before = control_before[i, side, joint, 1] / k_before

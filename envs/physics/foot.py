@@ -68,14 +68,14 @@ class FootJoint:
     """An ankle or a toe joint."""
 
     device: Spring | None = None
-    """Spring in place of muscles; None for muscles, whose stiffness the policy sets."""
+    """Spring in place of muscles; None for muscles, with stiffness set by the policy."""
     rest: float | None = None
-    """Rest angle of an adaptive device, whose stiffness the policy sets [rad]; None for muscles, which have the planned
-    one over the stride."""
+    """Rest angle of an adaptive device, with stiffness set by the policy [rad]; None for muscles, which have the
+    planned one over the stride."""
     strength: float = 1.0
     """Largest torque of the muscles downwards (plantarflexion) over that of the sound joint [-]."""
     acts_in_swing: bool = True
-    """False for an ankle whose muscles are slack while the leg swings; its passive tissue stays."""
+    """False for an ankle with muscles that are slack while the leg swings; its passive tissue stays."""
     orthosis: Spring | None = None
     """Spring beside the joint, which always acts."""
 

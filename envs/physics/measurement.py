@@ -264,7 +264,7 @@ def measure_bodies(bodies, state, sensors, velocity, warnings) -> None:
 
     Args:
         bodies: (N,) of `BODY_ROW`; `measured` is filled, and the window added to `muscles`.
-        state: (N, numbers) MuJoCo's, whose rows begin as `PLANT`.
+        state: (N, numbers) MuJoCo's, with rows that begin as `PLANT`.
         sensors: (N, S, side, contact, 3) contact forces of the window's S physics steps [N].
         velocity: (N, S, D) velocities of D degrees of freedom after these steps [m/s, rad/s].
         warnings: (N, kinds) how often MuJoCo has warned of each kind.

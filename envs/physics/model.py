@@ -29,7 +29,7 @@ HIP, KNEE, ANKLE, TOE = range(4)
 ACTIONS = tuple(f"{joint}_{side}" for side in SIDES for joint in ("ankle", "toe"))
 """Actions that set stiffness."""
 MOVED = ("hip", "knee", "ankle")
-"""Joints whose rest angles a person moves, the first of `JOINTS`."""
+"""Joints with rest angles that a person moves, the first of `JOINTS`."""
 PERSON_ACTIONS = tuple(f"rest_{joint}_{side}" for side in SIDES for joint in MOVED)
 """Actions of a person: how far the rest angles are moved from those of the constants."""
 
@@ -349,7 +349,7 @@ def _hinge(segment: "mujoco.MjsBody", side: str, index: int, body: Body, feet: F
 
 
 def _add_tendon(spec: mujoco.MjSpec, joint: str, orthosis: Spring | None) -> None:
-    """Add a tendon whose length is the joint's angle [rad], taut where an orthosis that acts one way engages.
+    """Add a tendon with the joint's angle as its length [rad], taut where an orthosis that acts one way engages.
 
     Without such an orthosis it is slack at any angle.
     """

@@ -42,7 +42,7 @@ def model_text(spec: mujoco.MjSpec) -> str:
     model = spec.compile()
     root = ElementTree.fromstring(spec.to_xml())
     world = _first_element(root, "worldbody")
-    bodies = list(world.iter("body"))  # in the order of the compiled model, whose first body is the world
+    bodies = list(world.iter("body"))  # in the order of the compiled model: its first body is the world
     for index, body in enumerate(bodies, start=1):
         _write(body, model, index)
         inertial = body.find("inertial")

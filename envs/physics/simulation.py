@@ -44,7 +44,7 @@ class Physics(NamedTuple):
     bodies: NDArray
     """(N,) of `BODY_ROW`."""
     state: NDArray
-    """(N, numbers) MuJoCo's state, whose rows begin as `PLANT`."""
+    """(N, numbers) MuJoCo's state, with rows that begin as `PLANT`."""
     sensors: NDArray
     """(N, S, side, contact, 3) contact forces of the last window's S physics steps [N]."""
     velocity: NDArray
@@ -60,8 +60,8 @@ class Simulation:
         body: the body that is simulated.
         num: N.
         threads: of the physics, up to `MOST_THREADS`; any number gives the same bits.
-        model: a custom model of that body in place of the default, for instance one whose timestep is another part of
-            `CONTROL_WINDOW`.
+        model: a custom model of that body in place of the default, for instance one with another part of
+            `CONTROL_WINDOW` as its timestep.
         friction: coefficient of friction between feet and ground in the default models [-].
         feet: N pairs, the feet of each simulation; sound ones if None.
         one_way: whether `fit` may give a simulation an orthosis that acts one way, even if these `feet` have none.

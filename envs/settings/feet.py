@@ -1,5 +1,5 @@
 """Read the settings `left_foot` and `right_foot`: kinds of feet, sound or prosthetic, and their numbers, once, into a
-`FootSetting`, whose `foot` is that of the physics (`envs.physics.foot`).
+`FootSetting`; its `foot` is that of the physics (`envs.physics.foot`).
 
 In plain JSON values a foot is a word, its kind, or a dictionary with a `kind` and any of the numbers of that kind.
 """
@@ -303,7 +303,7 @@ def _foot_of(kind: str, given: Mapping[str, Any]) -> Foot:
             ankle_spring, toe_spring = _springs(value)
             ankle = FootJoint(device=ankle_spring, orthosis=of_ankle)
             toe = FootJoint(device=toe_spring, orthosis=of_toe)
-        case "adaptive" if "schedule" in given:  # whose K and rest angles replace those of these springs
+        case "adaptive" if "schedule" in given:  # its K and rest angles replace those of these springs
             ankle = FootJoint(device=Spring(), orthosis=of_ankle)
             toe = FootJoint(device=Spring(), orthosis=of_toe)
         case "adaptive":

@@ -87,9 +87,9 @@ FASTEST_AIM = 5.0
 TENDON_RANGE = (100.0, 2000.0)
 """Stiffness of a tendon that the setting `ankle_tendon` takes [N m/rad]; chosen: a fourth and five times people's."""
 TUNED = "tuned"
-"""Name of the person who is no network: the rest angles of the leg constants alone, tuned to people's walk."""
+"""Name of the person without a network: the rest angles of the leg constants alone, tuned to people's walk."""
 OWN_PERSON: dict[Guide, str] = {"people": TUNED, "plan": "predicted"}
-"""Guide -> its own person, who walks where the setting `person` is None."""
+"""Guide -> its own person, the walker where the setting `person` is None."""
 DEFAULT_WEIGHTS = {
     "alive": 0.15,
     "speed": 0.40,
@@ -194,7 +194,7 @@ class BipedSettings:
     """Times of decisions on stiffness: every step, of 10, 20 or 40 ms; or, in steps of 20 ms, of each leg at its heel
     strike and at the foot flat, heel-off and toe-off of the guide, the action being held between them (event)."""
     stiffness_joints: StiffnessJoints = field(default="both", metadata=_SPRINGS)
-    """Joints whose stiffness the action decides; the other has the fixed schedule, and its actions are read as 0."""
+    """Joints with stiffness decided by the action; the other has the fixed schedule, and its actions are read as 0."""
     ankle_stiffness_range: tuple[float, float] = field(default=(LOWEST_STIFFNESS[0], 800.0), metadata=_SPRINGS)
     """Ankle stiffness at action -1 and +1 [N m/rad] for 1.70 m and 63 kg; scales with mass x height."""
     toe_stiffness_range: tuple[float, float] = field(default=(LOWEST_STIFFNESS[1], 200.0), metadata=_SPRINGS)
@@ -202,25 +202,25 @@ class BipedSettings:
     ankle_tendon: float | None = field(default=None, metadata=_SPRINGS)
     """Stiffness of the Achilles tendon about the ankle, for 1.70 m and 63 kg, [100..2000 N m/rad], such as 400. In
     walking a calf's K then is at most that of tendon and passive tissue as each 10 ms begin, and the term `stiffness`
-    charges the calf's own K beyond what its torque brings. By default there is no bound."""
+    charges the calf's own K beyond the part that its torque brings. By default there is no bound."""
     schedule: StiffnessSchedule | None = field(default=None, metadata=_SPRINGS)
     """Stiffness over the stride, JSON form of `springfoot.gait.springs.stiffness.StiffnessSchedule`; needed by
     equilibrium `phase`; action mode `residual` without one takes the fixed schedule of the leg tuning."""
     acts: Acts = field(default="stiffness", metadata=_PERSON)
-    """What the action sets: the stiffness of ankles and toes; the person, that is, offsets to the rest angles of hips,
-    knees and ankles, every 20 ms; or both (`springfoot.envs.control.person_actions`)."""
+    """Part that the action sets: the stiffness of ankles and toes; the person, that is, offsets to the rest angles of
+    hips, knees and ankles, every 20 ms; or both (`springfoot.envs.control.person_actions`)."""
     person: str | None = field(default=None, metadata=_PERSON)
-    """Who walks where the action sets stiffness alone: by default the guide's own, the tuned rest angles (tuned) or
-    the person who learned on the plan (predicted); one who has learned other feet, bodies and slopes (learned,
-    learned-2 to learned-5); or another one who learned on the same guide, a policy file of `springfoot train --preset
-    person`, or `predict`. On the plan nothing is tuned, so that `tuned` falls there."""
+    """Walker where the action sets stiffness alone: by default the guide's own, the tuned rest angles (tuned) or
+    the person trained on the plan (predicted); one trained on other feet, bodies and slopes (learned, learned-2 to
+    learned-5); or another one trained on the same guide, a policy file of `springfoot train --preset person`,
+    or `predict`. On the plan nothing is tuned, so that `tuned` falls there."""
     person_range_deg: float = field(default=14.0, metadata=_PERSON)
     """Largest offset of a rest angle, that of an action of 1 [0..30 deg]."""
     aim_rate: float = field(default=0.0, metadata=_PERSON)
     """Rate at which a person that walks too slowly aims at more than the commanded speed, one too fast at less [0..5
     1/s]; the person observes by how much, at most 0.2 m/s."""
     stiffness_by: StiffnessBy = field(default="action", metadata=_PERSON | _REPLACED)
-    """Who sets the stiffness where the action moves the person: the action, with `acts` `person` the fixed schedule;
+    """Source of the stiffness where the action moves the person: the action, with `acts` `person` the fixed schedule;
     that schedule always (schedule); the schedule times a
     factor drawn at each reset (scaled); one drawn stiffness of the ankles and one of the toes (constant); one drawn
     anew in every step (random); or a drawn one of these, mostly the action (drawn)."""
@@ -323,7 +323,7 @@ class BipedSettings:
 
     @property
     def walker(self) -> str:
-        """Return who walks where the action sets stiffness alone: the setting `person`, or the guide's own; `TUNED`
+        """Return the walker where the action sets stiffness alone: the setting `person`, or the guide's own; `TUNED`
         where the policy itself moves the legs."""
         return TUNED if self.acts != "stiffness" else self.person or OWN_PERSON[self.guide]
 

@@ -46,7 +46,7 @@ class Mirror:
 def mirror_of(observation_names: Sequence[str], action_names: Sequence[str]) -> Mirror:
     """Return the mirror of the entries of an observation (D,) and of the actions (A,) with these names.
 
-    Raises `SpringfootError` for a name with a side whose other side is missing, and for an action without a side.
+    Raises `SpringfootError` for a name with a side if the other side is missing, and for an action without a side.
     """
     action_index = _image_indices(action_names)
     for action, name in enumerate(action_names):

@@ -37,7 +37,7 @@ class Pushes:
     def force(self, steps: NDArray, random: Sequence[np.random.Generator | None], running: NDArray) -> NDArray:
         """Return (N,) the push on each trunk [N], forward positive, after `steps` (N,) of its episode.
 
-        Environments that are `running` (N,) and whose interval has ended draw their next push by their generators
+        Environments that are `running` (N,) with an ended interval draw their next push by their generators
         `random`.
         """
         time = steps * self._step

@@ -90,7 +90,7 @@ def _near_zmp(scale, control, targets, m, forces, i):
     if load <= 0.0:
         return 0.0
     phase = control.legs.phase
-    leader = LEFT if phase[LEFT] < 0.5 else RIGHT  # the leg whose stance began last
+    leader = LEFT if phase[LEFT] < 0.5 else RIGHT  # the leg that began its stance last
     target = targets[leader]
     # From the leader's ankle: the CoM's mean advance so far, and the ZMP less that advance (`TARGET`).
     ahead = control.subject.scale.length * (target.stride_length * phase[leader] + target.zmp)

@@ -31,7 +31,7 @@ TARGET = np.dtype(
         ("stride_length", float),  # of the plan [m], the same at every phase
     ]
 )
-"""The target at a phase of one leg's stride; `com`, `zmp`, `speed` are for the leg whose stance began last."""
+"""The target at a phase of one leg's stride; `com`, `zmp`, `speed` are for the leg that began its stance last."""
 
 
 def target_curves(gait: HumanGait, plan: ComPlan, step_seconds: float) -> NDArray:
@@ -62,7 +62,7 @@ def targets_at(table, control, curves) -> NDArray:
     """Return the target at the present phases of both legs, (side,) of `TARGET`.
 
     Args:
-        table: (R, SAMPLES, 2, C) of a `PhaseTable`, whose C curves are the numbers of `TARGET`.
+        table: (R, SAMPLES, 2, C) of a `PhaseTable`; its C curves are the numbers of `TARGET`.
         control: one of `CONTROL_ROW`, with the phases of the legs.
         curves: (side, C) memory, which is filled; the target is a view of it.
     """
@@ -76,7 +76,7 @@ def error_of(control, targets, m) -> tuple[float, float, float]:
     """Return CoM minus target of one body: x [m], z [m], forward speed [m/s].
 
     `control` is of `CONTROL_ROW`, `targets` (side,) of `TARGET`, `m` of `MEASURED`. The x of the target is from the
-    ankle of the leg whose stance began last; within the step it advances with the phase.
+    ankle of the leg that began its stance last; within the step it advances with the phase.
     """
     scale = control.subject.scale
     phase = control.legs.phase

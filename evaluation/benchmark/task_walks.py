@@ -77,7 +77,7 @@ def policy_on_task(policy: str, task: str) -> tuple[PolicyFunction, BipedSetting
     """Return a policy, and the task's settings for it: all the task's own but `HOW_IT_ACTS`.
 
     `policy` is a .safetensors file, a run folder (its best policy), one of the package, or a baseline. Raises
-    `SpringfootError` for another, and for a policy whose action means something else there: one trained with
+    `SpringfootError` for another, and for a policy with an action that means something else there: one trained with
     another of `MUST_AGREE`.
     """
     settings = settings_of_task(task)

@@ -41,7 +41,7 @@ NARROW_STANDPOINT, NARROW_MIDDLE = (0.7, -4.2, 1.3), (0.15, 0.0, -1.2)
 
 
 def fit_to_screen(client: viser.ClientHandle) -> None:
-    """Move the camera of a new browser whose picture is not wide, so that the panel of inputs does not hide the
+    """Move the camera of a new browser with a picture that is not wide, so that the panel of inputs does not hide the
     body."""
     camera = client.camera
     if camera.image_width < NARROW:
@@ -95,7 +95,7 @@ class LiveScene:
         scene.add_light_ambient("/daylight", intensity=DAYLIGHT)
         scene.add_light_directional("/sun", intensity=SUN, position=(2.0, -3.0, 4.0))
         self._bodies = {body: scene.add_frame(_name(body), show_axes=False) for body in range(1, model.nbody)}
-        for geom in np.flatnonzero(model.geom_bodyid).tolist():  # body 0 is the world, whose ground is drawn as a grid
+        for geom in np.flatnonzero(model.geom_bodyid).tolist():  # body 0 is the world: its ground is drawn as a grid
             self._add_geom(geom)
         # Half the angle, for a quaternion; negative, as a positive turn about y moves forward (x) down.
         turn = -np.radians(self._session.wishes.slope_deg) / 2

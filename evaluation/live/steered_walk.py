@@ -187,7 +187,7 @@ class LiveSession:
 
     @property
     def person(self) -> str:
-        """The name of the learned person who walks: of the setting `person`, or the policy that is one; "" for none."""
+        """The name of the walk's learned person: of the setting `person`, or the policy that is one; "" for none."""
         if self._settings.acts != "stiffness":
             return self.name
         return "" if self._settings.walker == TUNED else self._settings.walker

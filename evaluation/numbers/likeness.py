@@ -13,7 +13,7 @@ from springfoot.gait.people import scores as score
 from springfoot.gait.people.gait_events import PERCENT
 
 ANGLE_JOINTS = ("thigh", "knee", "ankle", "toe")
-"""Joints whose angle is held against people's; the thigh's is to the vertical."""
+"""Joints with an angle that is held against people's; the thigh's is to the vertical."""
 MOMENT_JOINTS = ("hip", "knee", "ankle")
 """Joints with a known moment of people."""
 LATE_SWING_PERCENT = 80

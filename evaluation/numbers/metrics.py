@@ -65,7 +65,7 @@ class Gait:
 def measure(recording: Recording, muscle: Muscle = AS_IS) -> Gait:
     """Compute every number of metrics.json and the mean curves, from the recording alone.
 
-    `muscle` has factors on properties of the muscles whose effort is measured.
+    `muscle` has factors on properties of the muscles with measured effort.
     """
     tally = tally_strides(recording, muscle)
     return Gait(metrics=_metrics(recording, tally), tally=tally)

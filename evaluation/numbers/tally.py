@@ -48,7 +48,7 @@ class StrideTally:
     both: StrideCurves = field(default_factory=lambda: StrideCurves(names=GAIT_CYCLE_COLUMNS))
     """Curves over the stride of both feet."""
     com: StrideCurves = field(default_factory=lambda: StrideCurves(names=("x", "z", "vx")))
-    """CoM over the step: x from the ankle of the foot whose stance began last, z above the ground [m], vx [m/s]."""
+    """CoM over the step: x from the ankle of the foot that began its stance last, z above the ground [m], vx [m/s]."""
     cop: StrideCurves = field(default_factory=lambda: StrideCurves(names=("x",)))
     """CoP of both feet over the step, x from the same ankle [m]."""
     reward: StrideCurves = field(default_factory=lambda: StrideCurves(names=TERMS))
@@ -105,7 +105,7 @@ def tally_strides(recording: Recording, muscle: Muscle = AS_IS) -> StrideTally:
     """Tally every stride, step and episode of a recording: its steady walk, without the warm-up.
 
     Whether an episode ends at rest is judged at its very end.
-    `muscle` has factors on properties of the muscles whose effort is tallied.
+    `muscle` has factors on properties of the muscles with tallied effort.
     """
     tally = StrideTally()
     fell = recording.fall_reason != ""

@@ -106,10 +106,11 @@ def _percent_of(strikes: NDArray, ticks: int) -> NDArray:
 def planned_zmp(recording: Recording, series: dict[str, NDArray]) -> NDArray:
     """Return the planned ZMP (T,) at the end of each tick [m forward of the world's origin].
 
-    It is that of the step of the foot whose stance began last. In the last percent of a step the value before it holds.
+    It is that of the step of the foot that began its stance last. In the last percent of a step the value before it
+    holds.
     """
     phase = series["phase"] % 1.0
-    side = np.where(phase[:, 0] < phase[:, 1], 0, 1)  # the leg whose stride, and so stance, began last
+    side = np.where(phase[:, 0] < phase[:, 1], 0, 1)  # the leg that began its stride, and so its stance, last
     ticks = np.arange(len(phase))
     step_percent = 200 * phase[ticks, side]  # a step is half a stride
     # At 100 percent the plan is at the next foot, so the last percent is held.

@@ -34,7 +34,7 @@ from .page_figure import walker_parts
 from .template import as_json, filled
 
 PAGE_PACKAGES = ("springfoot", "mujoco", "numpy")
-"""Packages whose versions the page names."""
+"""Packages that the page names with their versions."""
 JUDGED_SPEED = 1.2
 """Commanded speed for which the criteria were chosen [m/s]."""
 
@@ -248,7 +248,7 @@ OVERLOAD = 1.25
 
 
 def _overload_sentence(legs: Mapping[str, Mapping[str, Any]], people: Mapping[str, Any], whose: str) -> str:
-    """Return a sentence that names the feet whose largest vertical force is over `OVERLOAD` times people's mean peak.
+    """Return a sentence that names the feet with a largest vertical force over `OVERLOAD` times people's mean peak.
 
     `legs` are those of `leg_numbers`, `people` the numbers of `people_metrics`, `whose` the word for these people.
     """

@@ -43,7 +43,7 @@ SAME_K = 1e-9
 
 
 def deciding_legs(settings: BipedSettings) -> list[int]:
-    """Return the legs whose ankle and toe follow the policy's K, 0 left and 1 right.
+    """Return the legs with ankle and toe that follow the policy's K, 0 left and 1 right.
 
     A leg with a device at ankle or toe is left out: the device has a stiffness of its own.
     """

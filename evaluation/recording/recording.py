@@ -95,7 +95,7 @@ class Recording:
     fall_reason: NDArray
     """(E,) reason of a fall, "" for an episode without one."""
     plan_com: NDArray
-    """(101, 2) planned CoM over percent of the step: x from the ankle of the foot whose stance began last, z [m]."""
+    """(101, 2) planned CoM over percent of the step: x from the ankle of the foot that began its stance last, z [m]."""
     plan_zmp: NDArray
     """(101,) planned ZMP over percent of the step, x from the same ankle [m]."""
     series: dict[str, NDArray]
@@ -187,7 +187,7 @@ def _require_whole(recording: Recording) -> None:
 
 
 def require_recordable(settings: BipedSettings, episodes: int) -> None:
-    """Raise `SpringfootError` for episodes whose series would fill the memory."""
+    """Raise `SpringfootError` for episodes with series that would fill the memory."""
     if episodes * settings.episode_seconds > LONGEST_RECORDING:
         raise SpringfootError(
             f"a recording must be of at most {LONGEST_RECORDING:,} s in all, got {episodes} episodes of "

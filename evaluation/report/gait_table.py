@@ -484,7 +484,7 @@ def people_metrics(settings: BipedSettings) -> dict[str, Any]:
     """Return the gait's numbers of people, or of the user's own data, at the body and speed of `settings`; keys as in
     metrics.json.
 
-    They are of people's mean curves. Effort is without the toe, whose moment is not measured.
+    They are of people's mean curves. Effort is without the toe: its moment is not measured.
     """
     human = reference_gait(settings)
     body = body_of(settings)

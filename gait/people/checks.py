@@ -1,7 +1,7 @@
 """Check that measured curves are those of a walking person, in the units and signs of `HumanGait`, by people's curves.
 
 A wrong unit makes a curve many times too large or too small, another zero moves it, a wrong sign turns it, a wrong foot
-shifts it by half a stride, time that runs backward reverses it, noise roughens it. People who walk otherwise, or a body
+shifts it by half a stride, time that runs backward reverses it, noise roughens it. People with another walk, or a body
 that walks here on any of its feet, slopes and speeds, differ from people by less than that.
 """
 
@@ -117,7 +117,7 @@ at least."""
 
 
 MOST_SPREAD = 2.0
-"""Largest standard deviation over the range of a curve, its own or people's; chosen. A person who limps here has
+"""Largest standard deviation over the range of a curve, its own or people's; chosen. A limping person here has
 1.02."""
 Curves = Mapping[str, NDArray]
 AS_IT_IS = "if it is right, trust_units takes it as it is"

@@ -60,8 +60,8 @@ LONGEST_SKIP = 1e4
 """Longest start of a walk that may be left out [s]; chosen."""
 LONG_WALK = 10.0
 """Time from which the first `WARM_UP` of a walk does not count [s]; chosen. A simulation begins in a state that is not
-yet its gait, and on a laboratory's treadmill, whose belt may still speed up, these are 3 of ten strides or more; walks
-over ground, which begin before the cameras see them, are shorter."""
+yet its gait, and on a laboratory's treadmill, where the belt may still speed up, these are 3 of ten strides or more;
+walks over ground, which begin before the cameras see them, are shorter."""
 
 LATE_STANCE, MID_STANCE = (0.7, 1.0), (0.25, 0.6)
 """Parts of stance after heel-off, and with a flat foot; chosen."""
@@ -293,7 +293,7 @@ def _require_toe(name: str, legs: Mapping[str, LegStrides], usual_toe_off: float
     """Raise `SpringfootError` for a toe that moves as none does: another foot's, of the wrong sign, or in another unit.
 
     The toe turns up after heel-off, and its moment, plantarflexion positive, is largest then and smaller than the
-    ankle's, whose lever is longer. `usual_toe_off` is the phase of toe-off of legs that do not tell their own.
+    ankle's with its longer lever. `usual_toe_off` is the phase of toe-off of legs that do not tell their own.
     """
     for side, leg in legs.items():
         where = f"{name}, the {side or 'one'} leg"

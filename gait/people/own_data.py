@@ -58,7 +58,7 @@ TOE_OFF_COLUMN = "toe_off_percent"
 COMFORTABLE_SPEED = 1.2
 """Speed of the people to compare curves of unknown speed with [m/s]; chosen."""
 SPEEDS_APART = 1.4
-"""Largest factor between a file's speed and that of its step length and stride time; chosen. A person who limps here
+"""Largest factor between a file's speed and that of its step length and stride time; chosen. A limping person here
 has steps of one foot that make 1.21, and mistakes make 2."""
 _MOST_COEFFICIENTS = 64
 _LARGEST = 1e3

@@ -124,8 +124,8 @@ class LegStrides:
     curves: Series
     """Curve -> (S, 101) over percent of each stride, in the units of `HumanGait`."""
     weighed: NDArray
-    """(S,) True for strides whose forces and moments count: none but those on a force plate, where the file has
-    forces."""
+    """(S,) True for strides with forces and moments that count: none but those on a force plate, where the file
+    has forces."""
     partly: NDArray = field(default_factory=lambda: np.zeros(0, bool))
     """(S,) True for strides on a force plate that do not count, as a part of the force is missing."""
     fine: Series = field(default_factory=dict)
@@ -427,7 +427,7 @@ class BorneMass(NamedTuple):
     mass: float
     """[kg]."""
     legs: tuple[str, ...]
-    """Legs whose forces tell it."""
+    """Legs with the forces that tell it."""
 
 
 def borne_mass(walk: MeasuredWalk) -> BorneMass | None:
@@ -528,7 +528,7 @@ def _events_of_motion(thigh: NDArray, knee: NDArray, ankle: NDArray, tick: float
 
     Samples are `tick` [s] apart, the first at time `first` [s]. Distances are from the hip, on a body of average
     proportions: only the times of the extremes count. After Zeni, Richards, Higginson, Gait & Posture 27 (2008)
-    710-714, who take markers from the sacrum, with the delay of people's events after these extremes.
+    710-714 (there with markers from the sacrum), with the delay of people's events after these extremes.
     """
     from scipy.signal import find_peaks  # as below
 
@@ -587,8 +587,8 @@ def _on_plate(vertical: NDArray, weight: float | None) -> NDArray:
 
 
 def _ends_abruptly(vertical: NDArray, weight: float | None) -> NDArray:
-    """Return (S,) True for strides whose force falls by `ABRUPT_UNLOADING` at once to next to nothing; arguments as in
-    `_on_plate`."""
+    """Return (S,) True for strides with a force that falls by `ABRUPT_UNLOADING` at once to next to nothing; arguments
+    as in `_on_plate`."""
     weight = weight or _body_weight(vertical)
     begin = WEIGHT_BEARING[0]
     after = vertical[:, begin + 2 :]

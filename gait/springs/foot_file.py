@@ -19,8 +19,8 @@ def read_foot(path: str | Path) -> dict[str, Any]:
     """Return the foot described in a file, as a value of the settings `left_foot` and `right_foot`.
 
     A CSV file is a passive foot with these torques; a joint without columns has its defaults. A JSON file is a foot's
-    dictionary; or for an adaptive foot that follows them, a `StiffnessSchedule` or finite states, whose K is the
-    device's as written, for any body, and whose damping times are not read: it damps as muscles do. Raises
+    dictionary; or for an adaptive foot that follows them, a `StiffnessSchedule` or finite states. Their K is the
+    device's as written, for any body; their damping times are not read: the device damps as muscles do. Raises
     `SpringfootError` for another file; the numbers of a foot are checked when the setting is made.
     """
     path = Path(path)

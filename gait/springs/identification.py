@@ -9,9 +9,9 @@ spread (`PhaseSpring.angle_spread`).
 
 Its limit: no data of an undisturbed gait tell a theta_eq that stands still from one that moves with the angle. The
 result is the slope of the loop of torque over angle (quasi-stiffness), and the spring's K only if theta_eq stood still
-in the phase. On the simulation's own schedule, whose theta_eq moves, it gives 162 N m/rad for an applied 424 at 30-44
-% of the stride, and 137 for 296 at 50-62 % (`springfoot study identify schedule`); interval and warning do not show it.
-If a gait can be pushed, `identification_by_pushes` finds K itself.
+in the phase. On the simulation's own schedule, with a theta_eq that moves, it gives 162 N m/rad for an applied 424 at
+30-44 % of the stride, and 137 for 296 at 50-62 % (`springfoot study identify schedule`); interval and warning do not
+show it. If a gait can be pushed, `identification_by_pushes` finds K itself.
 """
 
 from collections.abc import Sequence

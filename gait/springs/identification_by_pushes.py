@@ -16,8 +16,8 @@ some theta_eq.
 Phases are equal within bins of `BIN`, and the mean course is a straight line in each bin, since theta_eq moves on in
 it; a trial's own course is one straight line over the phase of the stride. K is linear between knots: a ramp fitted by
 a constant leaks its own deviations into K. Intervals leave out one trial at a time (`jackknife`), so that errors may
-last a whole trial. Further states are tested as well: a joint whose torque reacts to one of them is no spring, whatever
-K is fitted.
+last a whole trial. Further states are tested as well: a joint with a torque that reacts to one of them is no spring,
+whatever K is fitted.
 
 Limits of the experiment: a reflex of the joint's own angle at the same instant looks like a spring, a reaction to an
 unrecorded state like noise, and white noise of standard deviation d on the angle makes K too small, by s^2 / (s^2 +
@@ -257,7 +257,7 @@ def _verdict(K: Estimate, explained: float, reaction: float, chance: float) -> t
 
 
 def _unknown_spring(common: dict[str, float], reason: str) -> PushedSpring:
-    """Return the result of a phase whose data determine no number, with the reason."""
+    """Return the result, with the reason, of a phase with data that determine no number."""
     return PushedSpring(
         **common,  # type: ignore[arg-type]
         stiffness=None,

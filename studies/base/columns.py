@@ -11,7 +11,7 @@ from springfoot.files.markdown import text_of
 from springfoot.files.writing import csv_text
 
 COMPARED_JOINTS = ("thigh", "knee", "ankle")
-"""Joints whose angles are compared; people's toe comes from another measurement of other people."""
+"""Joints with angles that are compared; people's toe comes from another measurement of other people."""
 
 
 OPEN_LOOP = "open loop"

@@ -100,9 +100,9 @@ def read_foot_flag(words: str) -> str | dict[str, Any]:
 
 
 LIST_FLAGS = ("drawn_feet", "drawn_bodies")
-"""Settings whose flag is a list in JSON."""
+"""Settings with a list in JSON as their flag."""
 FILE_FLAGS = {"human": read_own_gait}
-"""Setting whose flag is a file's name -> function that reads the setting from the file."""
+"""Setting with a file's name as its flag -> function that reads the setting from the file."""
 
 
 TRUST = "trust_units"
@@ -208,8 +208,8 @@ def _given_words(flags: Any) -> dict[str, Any]:
 
 
 def _evaluation_help(theme: str) -> str:
-    """Return the help of a theme of settings in an evaluation; it lists the flags whose values a trained policy brings
-    with it."""
+    """Return the help of a theme of settings in an evaluation; it lists the flags with values that a trained policy
+    brings with it."""
     settings = [name for name, theme_of_name in THEME_OF.items() if theme_of_name == theme]
     settings = [name for name in settings if name != "episode_seconds"]  # the flag --seconds
     brought = [f"--{name.replace('_', '-')}" for name in settings if name not in CONDITION_SETTINGS]

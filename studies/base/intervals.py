@@ -38,8 +38,9 @@ def mean_interval(values: NDArray, level: float = LEVEL) -> tuple[float, float]:
 
 
 def of_persons(values: Sequence[NDArray]) -> NDArray:
-    """Return the sample (n,) whose spread tells how well a mean is known, from the values (E,) of each person in its
-    episodes: the persons' means, as one person's episodes say nothing of how others learn; of one person its episodes.
+    """Return the sample (n,) with the spread that tells how well a mean is known, from the values (E,) of each person
+    in its episodes: the persons' means, as one person's episodes say nothing of how others learn; of one person its
+    episodes.
 
     A person without values is left out.
     """

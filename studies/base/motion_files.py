@@ -30,7 +30,7 @@ class MotionFiles(Study):
     height: float = REFERENCE_HEIGHT
     """Body height [m], of the norm and of a body that walks here."""
     side: Literal["left", "right", "both"] = "both"
-    """Side whose strides count."""
+    """Side of the strides that count."""
     columns: Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="OURS=THEIRS")] = ()
     """Name of a column here, and its name in the files, such as knee_angle_r=KneeRight; once for each column."""
     speed: float | None = None

@@ -42,7 +42,7 @@ class Study:
     """A question asked of walks, with the flags that every study has; a subclass answers it in `ask`."""
 
     quick: tyro.conf.FlagCreatePairsOff[bool] = False
-    """See that it runs, in a minute at most: tiny counts in place of what is flagged; its figures then mean nothing."""
+    """See that it runs, in a minute at most: tiny counts in place of flagged ones; its figures then mean nothing."""
     out: Annotated[Path | None, tyro.conf.arg(metavar="FOLDER", help_behavior_hint="(default: runs/NAME-N)")] = None
     """New folder for its CSV files and pictures."""
     command: tyro.conf.Suppress[tyro.conf.Fixed[str]] = ""
@@ -122,7 +122,7 @@ def _write(path: Path, content: str | Callable[[Path], object]) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class WalkingStudy(Study):
-    """A study whose tables have a row for each policy or condition, all walked from the same seeds."""
+    """A study with a row for each policy or condition in its tables, all walked from the same seeds."""
 
     episodes: int = 20
     """Episodes of each row."""

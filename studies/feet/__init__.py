@@ -1,1 +1,1 @@
-"""Studies of feet and of the persons who wear them: controls of the price, learned persons, orthoses."""
+"""Studies of feet and of their wearers: controls of the price, learned persons, orthoses."""

@@ -37,7 +37,7 @@ CONTROL_PRICES = (*TWO_PRICES, "net_joint_J_kg_m")
 """Columns of prices in the table of walks; the last is the old price."""
 UNCHANGED = "sound"
 STIFFEST = "500 N·m/rad, right ankle"
-"""The condition whose spring once "saved" 13 %, when net joint work was the price."""
+"""The condition with the spring that once "saved" 13 %, when net joint work was the price."""
 
 
 BOTH_ANKLES = (0.0, 50.0, 100.0, 150.0, 250.0, 350.0, 500.0)
@@ -85,7 +85,7 @@ TRIED_SPRINGS = (
         settings={k: both(braced(ankle_stiffness=k, engages="dorsiflexion") | WITH_MASS) for k in BOTH_ANKLES},
     ),
 )
-"""Springs whose best stiffness and saving are told."""
+"""Springs with a best stiffness and a saving that are told."""
 CONTROLS: dict[str, Mapping[str, Any]] = {
     UNCHANGED: {},
     **{springs.conditions[k]: given for springs in TRIED_SPRINGS for k, given in springs.settings.items()},
@@ -104,7 +104,7 @@ CONTROLS: dict[str, Mapping[str, Any]] = {
 
 @dataclass(frozen=True, kw_only=True)
 class Controls(WalkingStudy):
-    """Walk a sound person under conditions whose price is known, and compare prices at equal walked speeds."""
+    """Walk a sound person under conditions of known price, and compare prices at equal walked speeds."""
 
     episodes: int = 5
     """Episodes of each condition and commanded speed."""

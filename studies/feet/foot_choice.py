@@ -137,7 +137,7 @@ class FootChoice(WalkingStudy):
     side: Literal["left", "right", "both"] = "both"
     """Side on which the springs or feet are worn; the other foot is sound."""
     calf: float | None = None
-    """Strength of the calf beside the springs, as a share of a sound one's, whose largest moment is 0.19 x body weight
+    """Strength of the calf beside the springs, as a share of a sound one's, with a largest moment of 0.19 x body weight
     x height in the simulation and 0.10 x in the price; 0.1 to 0.6, None for a sound calf."""
     spring: tuple[float, ...] = ()
     """Stiffness of orthoses at the ankle, 0 to 17.45 [N m/deg], at rest at --rest-deg; 0 is a slack one."""

@@ -1,4 +1,4 @@
-"""Ask how persons walk whom nobody tuned: on drawn bodies, feet, speeds and slopes, and on sound feet beside people.
+"""Ask how persons without tuning walk: on drawn bodies, feet, speeds and slopes, and on sound feet beside people.
 
     springfoot study persons learned learned-2
 
@@ -79,8 +79,8 @@ def feet_in_words(feet: Feet) -> str:
 def walk_drawn(
     act: PolicyFunction, settings: BipedSettings, episodes: int, threads: int, progress: OnProgress
 ) -> list[DrawnEpisode]:
-    """Walk this many `episodes`, whose body, feet, speed and slope a reset draws from the ranges of `settings`; return
-    them in the order of their seeds, from `FIRST_SEED` on."""
+    """Walk this many `episodes`, with body, feet, speed and slope that a reset draws from the ranges of `settings`;
+    return them in the order of their seeds, from `FIRST_SEED` on."""
     walked = []
     for first in range(0, episodes, _BATCH):
         count = min(_BATCH, episodes - first)

@@ -44,7 +44,7 @@ class Price(WalkingStudy):
     """Price walks with tendons half and twice as stiff, and read the charge of K."""
 
     policies: tuple[str, ...] = ("schedule", "predicted", "pretrained")
-    """Policies whose walks are priced."""
+    """Policies with walks that are priced."""
     episodes: int = 5
     """Episodes of each walk."""
     seconds: float = 12.0

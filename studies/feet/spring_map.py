@@ -45,7 +45,7 @@ class SpringMap(PersonsStudy):
     """Unit of the stiffness."""
 
     def settings_of(self, case: float) -> Mapping[str, Any]:
-        """Return the settings of the body in a case, whose value `case` is one of `CASES`."""
+        """Return the settings of the body in a case; its value `case` is one of `CASES`."""
         raise NotImplementedError
 
     def feet_of(self, case: float, spring: float) -> Mapping[str, Any]:

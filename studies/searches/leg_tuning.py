@@ -207,7 +207,7 @@ class LegTuning(Study):
         lengths = [float(np.linalg.norm(misses))]
         damping = 1.0
         for _ in range(self.refinements):
-            # Jacobian of the misses by finite differences; a constant whose change falls has no slope.
+            # Jacobian of the misses by finite differences; a constant with a change that falls has no slope.
             changed = misses_at(vector + DIFFERENCE * identity)
             columns = [np.zeros(len(misses)) if near is None else (near - misses) / DIFFERENCE for near in changed]
             jacobian = np.clip(np.stack(columns, -1), -STEEPEST, STEEPEST)

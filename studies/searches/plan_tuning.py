@@ -106,7 +106,7 @@ PER_METRE_LOW, PER_UNIT = 200.0, 10.0
 """Cost of a swing foot that is too low [1/m], and of a choice outside its bounds, squared; chosen."""
 NEARLY_LEAST, MOST_NEAR = 1.1, 50
 """Cost over the least cost up to which a plan counts as nearly as good, and how many of those that a search meets are
-held against people; chosen. The range of their distances from people tells what least effort leaves open."""
+held against people; chosen. The range of their distances from people tells how much least effort leaves open."""
 IMPOSSIBLE = 30.0
 """Cost of an impossible plan, to which the distance of its choices from the start is added; chosen."""
 
@@ -157,7 +157,7 @@ def price(
         speed: speed of the plan [m/s].
         vector: vector of the search (`style_at`).
         weights: weights of work, activation, its rate, and acceleration.
-        muscle: muscles whose effort counts.
+        muscle: muscles with effort that counts.
         cadence: step length and time, people's or those of the vector.
         human: gait in place of people's.
 
@@ -248,7 +248,7 @@ class PlanTuning(Study):
 
     @property
     def found_speeds(self) -> tuple[float, ...]:
-        """Return the speeds whose styles the search finds [m/s]: the first and the last."""
+        """Return the speeds of the styles that the search finds [m/s]: the first and the last."""
         return tuple(dict.fromkeys((self.speeds[0], self.speeds[-1])))
 
     def ask(self, progress: OnProgress) -> Answer:
@@ -262,7 +262,7 @@ class PlanTuning(Study):
         if self.processes == 1:
             yield map
             return
-        # They leave Ctrl-C to this process. None is a copy of this one, whose threads a copy would lack.
+        # They leave Ctrl-C to this process. None is a copy of this one: a copy would lack its threads.
         how = {"mp_context": get_context("spawn"), "initializer": signal, "initargs": (SIGINT, SIG_IGN)}
         with ProcessPoolExecutor(self.processes, **how) as pool:
             yield pool.map

@@ -1,4 +1,4 @@
-"""Predict a walk from body, plan and physics by one command: plans, a person who learns to walk them, an evaluation.
+"""Predict a walk from body, plan and physics by one command: plans, a person trained on them, an evaluation.
 
     springfoot study predict
 
@@ -34,15 +34,15 @@ from .prediction_table import people_numbers, plan_numbers, prediction_table, wa
 FOUND = "styles.json"
 """File with the styles of the plans, a `plan_file` of the settings."""
 PLAN_SPEEDS: dict[float, float | None] = {1.2: None, 1.05: 1.2, 0.9: 1.05, 1.35: 1.2, 1.5: 1.35, 1.65: 1.5}
-"""Speed of a plan [m/s] -> the one at whose style its search begins; None: at round numbers. Chosen: with one style for
-all speeds a walk changes with speed otherwise than people's."""
+"""Speed of a plan [m/s] -> the one with the style at which its search begins; None: at round numbers. Chosen: with one
+style for all speeds a walk changes with speed otherwise than people's."""
 NEXT_SPREAD = 0.2
 """First spread of a search that begins at another speed's style, in units of the search; chosen."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Predict(WalkingStudy):
-    """Predict a walk from nothing: plans of least effort, a person who learns to walk them, numbers."""
+    """Predict a walk from nothing: plans of least effort, a person trained on them, numbers."""
 
     runs: Annotated[Path, tyro.conf.arg(metavar="FOLDER")] = Path("runs/predict")
     """Folder in which each stage keeps its result; the same command goes on there after a stop."""

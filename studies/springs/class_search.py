@@ -1,4 +1,4 @@
-"""Search a class of stiffness for one person, and walk the test with what was found."""
+"""Search a class of stiffness for one person, and walk the test with the stiffness found."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -55,7 +55,7 @@ class Condition(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class PersonsSearch:
-    """Searches and tests of one person, whose costs and numbers are kept."""
+    """Searches and tests of one person, with kept costs and numbers."""
 
     person: str
     """Policy that moves the person."""
@@ -79,14 +79,14 @@ class PersonsSearch:
     """Function called with the simulated time [s] of each step."""
 
     def search(self, aim: str, of_class: StiffnessClass, start: NDArray, link: StiffnessClass) -> NDArray:
-        """Search the class `of_class` from the vector `start`, for the link whose outer class is `link`; return the
+        """Search the class `of_class` from the vector `start`, for the link with the outer class `link`; return the
         vector found: the search's mean at the end, or `start` if that costs no more on other walks.
 
         Costs in `folder` and in `kept` are not computed again.
         """
 
         def costs_of(generation: int, vectors: list[NDArray]) -> NDArray:
-            """Return the costs of a generation, whose candidates all walk from the same start."""
+            """Return the costs of a generation; its candidates all walk from the same start."""
             return self._costs(aim, of_class, vectors, self.seed + generation, 1)
 
         options = {"popsize": self.population, "seed": self.seed + 1, "verbose": -9}

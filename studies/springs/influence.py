@@ -96,7 +96,7 @@ class Influence(Study):
     """Change stiffness in each joint and phase, and follow torque, CoM acceleration and movement."""
 
     policy: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="POLICY")] = "schedule"
-    """Policy whose stiffness changes: any of evaluate.py."""
+    """Policy with the stiffness that changes: any of evaluate.py."""
     change_percent: float = 10.0
     """Change of K [%]."""
     conditions: tuple[str, ...] = INFLUENCE_CONDITIONS
@@ -292,7 +292,7 @@ DRAWN_STRIDES = {
     "second": ("2", "#4d97b0", 0.0),
     "many": ("many", MODEL, -0.26),
 }
-"""Strides whose change of speed is drawn -> colour, and offset from the middle of the row."""
+"""Strides with a change of speed that is drawn -> colour, and offset from the middle of the row."""
 ROWS = -np.array([cell + 1.2 * joint for cell, (joint, _) in enumerate(CELLS)])
 """Position of each joint and phase on the vertical axis, with a gap between the joints."""
 LABELLED = 3e-3

@@ -2,9 +2,9 @@
 
     springfoot study landscape learned
 
-The stiffness stays the same over the whole stride and is set for the person, who knows that and moves hips, knees and
-the springs' rest angles. So the map tells where a walk lies if only its stiffness differs: its falls, undisturbed and
-pushed, its cost of a metre at equal walked speed, and its distance from people's.
+The stiffness stays the same over the whole stride and is set for the person. Knowing that, the person moves hips, knees
+and the springs' rest angles. So the map tells where a walk lies if only its stiffness differs: its falls, undisturbed
+and pushed, its cost of a metre at equal walked speed, and its distance from people's.
 """
 
 from collections.abc import Mapping, Sequence
@@ -38,13 +38,13 @@ TOES = (7.0, 14.0, 28.0, 56.0, 84.0)
 NOT_DEARER = 0.05
 """Share by which a price may exceed the least one and not be told apart from it; as `told_apart.GAP` of feet."""
 AGREEING = 3
-"""Persons who must all agree for a direction to be known."""
+"""Persons needed, all in agreement, for a direction to be known."""
 BOTH_STIFFNESSES = ("ankle_N_m_rad", "toe_N_m_rad")
 """Columns of the two stiffnesses."""
 DISTANCE = "angles_rmse_deg"
 """Column of the distance from people: rms of the angles' mean curves from theirs, mean over `COMPARED_JOINTS` [deg]."""
 SEARCHED = {TWO_PRICES[0]: "fibre work", TWO_PRICES[1]: "effort", DISTANCE: "distance from people"}
-"""Column whose least value is looked for -> its name."""
+"""Column with a least value that is looked for -> its name."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -23,8 +23,8 @@ from springfoot.gait.springs import SPRINGS, PhaseSpring, PushedSpring, identify
 BOUNDS = (*PLATEAUS, 1.0)
 """Bounds of the phases: the plateaus of the fixed schedule, where K is constant, and the ramps between them."""
 DECISIONS = "100hz"
-"""Decisions of baselines and open-loop copies, whose K follows the phase alone: as often as theta_eq moves. K that is
-held for longer belongs to an earlier phase, by another amount in each step, and on a ramp it is no function of
+"""Decisions of baselines and open-loop copies, with K that follows the phase alone: as often as theta_eq moves. K that
+is held for longer belongs to an earlier phase, by another amount in each step, and on a ramp it is no function of
 phase."""
 LOADED = 0.1
 """A joint carries load in a phase if its mean torque there is beyond this fraction of the largest torque of its mean

@@ -36,7 +36,7 @@ _ERROR_SIZES = np.array(list(ERRORS.values()))
 
 @dataclass(frozen=True, kw_only=True)
 class StiffnessClass:
-    """Class of stiffness, whose members are vectors (size,): ln K / `CENTRE` of the ankle's parts, of the toe's parts,
+    """Class of stiffness; its members are vectors (size,): ln K / `CENTRE` of the ankle's parts, of the toe's parts,
     then the gains, by error and part."""
 
     name: str

@@ -63,8 +63,8 @@ class Response:
 
     @property
     def foretold(self) -> NDArray:
-        """Return (C,) True for moved cells whose change of speed has the sign of the acceleration at the unchanged
-        walk's states."""
+        """Return (C,) True for moved cells with a change of speed that has the sign of the acceleration at the
+        unchanged walk's states."""
         return self.moved & (self.mean[IMPULSE] * self.mean[MANY_STRIDES_SPEED] > 0)
 
 

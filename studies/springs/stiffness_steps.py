@@ -73,7 +73,7 @@ class PairedWalks:
 
     @property
     def unfinished(self) -> NDArray:
-        """Return (C, len(DURATIONS)) the number of unfinished walks with a change whose unchanged walk was finished.
+        """Return (C, len(DURATIONS)) the number of unfinished walks with a change beside a finished unchanged walk.
 
         C are the cells: joint and phase of the change.
         """
@@ -243,8 +243,8 @@ class _Samples:
             self._sample(index, tick.phase[index])
 
     def _sample(self, index: int, phase: NDArray) -> None:
-        """Add the effect of each change at the present state of an unchanged walk, for each leg whose `phase` (side,)
-        is that of the change."""
+        """Add the effect of each change at the present state of an unchanged walk, for each leg with a `phase`
+        (side,) in that of the change."""
         torque, acceleration = step_at(self._biped.model, self._biped.data(index), self._change)
         for cell, (joint, name) in enumerate(CELLS):
             begin, end = PHASES[name]
@@ -286,7 +286,7 @@ def _paired(
     # Copy 0 is unchanged, copy 1 + len(DURATIONS) x cell + duration has that change.
     one_stride = 1 + np.arange(len(CELLS)) * len(DURATIONS)  # copy with each cell's change of one stride
     phase_index = [list(PHASES).index(name) for _, name in CELLS]
-    complete = np.isfinite(movement[0]).all((1, 2))  # seeds whose unchanged walk is finished, a step in each stride
+    complete = np.isfinite(movement[0]).all((1, 2))  # seeds with a finished unchanged walk, a step in each stride
     # Means over the samples, and the acceleration's integral over the phase of one leg.
     counts, sums = np.split(samples.sums, [1], axis=-1)
     mean = sums / np.where(complete[:, None], counts, np.nan)

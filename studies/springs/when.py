@@ -1,4 +1,4 @@
-"""Ask what it buys to vary ankle and toe stiffness within the step, for persons who stay as they are.
+"""Tell the gain of varying ankle and toe stiffness within the step, for persons that stay as they are.
 
     springfoot study when learned learned-2 learned-3 --keep runs/when
 
@@ -62,7 +62,7 @@ class When(WalkingStudy):
     population: int = 10
     """Candidates of each generation; each walks one episode, pushed."""
     aims: tuple[Aim, ...] = get_args(Aim)
-    """What to search for: least fibre work, likeness, or both apart."""
+    """Aims of the searches: least fibre work, likeness, or both apart."""
     pushes: tuple[float, ...] = (100.0, 200.0, 300.0)
     """Sizes of the pushes [N]; the searches have the first."""
     roughness: tuple[float, ...] = (0.01,)
@@ -125,7 +125,7 @@ class When(WalkingStudy):
         return Answer(text=self._text(links), files=files)
 
     def _search_of(self, person: str, progress: OnProgress) -> PersonsSearch:
-        """Return the search of a person, whose costs and numbers are in a folder of its own in `keep`."""
+        """Return the search of a person, with costs and numbers in a folder of its own in `keep`."""
         folder = None if self.keep is None else self.keep / known_as(person)[-1][:12]  # the beginning of its digest
         if folder is not None:
             folder.mkdir(parents=True, exist_ok=True)

@@ -251,8 +251,8 @@ class Ablations(WalkingStudy):
     timesteps: int | None = None
     """Steps of 20 ms of each training, the preset's unless given."""
     engine: Engine = "here"
-    """Where missing seeds are trained: in processes on this machine, or on a Ray cluster (extra `rllib`) whose nodes
-    share the folder of the trainings."""
+    """Where missing seeds are trained: in processes on this machine, or on a Ray cluster (extra `rllib`) with
+    nodes that share the folder of the trainings."""
     train: bool = True
     """Train missing seeds; without, use the finished ones."""
     only: tuple[str, ...] = ()

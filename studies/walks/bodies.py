@@ -157,7 +157,8 @@ def _body_and_speed(row: Mapping[str, Any]) -> str:
 class Bodies(Study):
     """Walk many bodies at many speeds: falls, speed, joint angles and forces against people's, over all pairs.
 
-    A trained policy stands beside its open-loop copy, whose mean stiffness changes with speed and scales with the body.
+    A trained policy stands beside its open-loop copy. The copy's mean stiffness changes with speed and scales with
+    the body.
     """
 
     policy: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="POLICY")] = "pretrained"

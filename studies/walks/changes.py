@@ -98,7 +98,7 @@ QUANTITIES = (
     Quantity("hip's positive work [J/kg]", "hip_power", positive_work),
     Quantity("knee's negative work [J/kg]", "knee_power", negative_work),
 )
-"""Numbers whose changes are told; listed before a walk was held against them."""
+"""Numbers with changes that are told; listed before a walk was held against them."""
 WITHIN = 2.0
 """Factor within which a change has the right size."""
 
@@ -159,7 +159,7 @@ class Changes(WalkingStudy):
     plan_file: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="(default: the package's)")] = (
         None
     )
-    """File of styles whose plans stand beside the policies."""
+    """File of styles; their plans stand beside the policies."""
 
     QUICK: ClassVar[Mapping[str, Any]] = {"episodes": 1, "seconds": 6.0}
 

@@ -267,7 +267,7 @@ def _label(key: Any) -> str:
 
 
 def sign_is(sign: str, known: int) -> str | None:
-    """Return "right", "wrong" or `UNCLEAR` for an effect whose sign is `known` (`known_sign`), held against the
+    """Return "right", "wrong" or `UNCLEAR` for an effect with the sign `known` (`known_sign`), held against the
     published `sign` + or -; None without a published sign."""
     if not sign:
         return None

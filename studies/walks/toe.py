@@ -1,4 +1,4 @@
-"""Ask what a toe joint does for a walk: free, sprung, locked or absent, on both feet, for persons who adapt to each.
+"""Tell the effect of a toe joint on a walk: free, sprung, locked or absent, on both feet, for persons adapted to each.
 
     springfoot study toe
     springfoot study toe learned runs/person --keep runs/toe.json
@@ -83,7 +83,7 @@ BESIDE = {
 }
 """Effect of docs/effects.csv on a toe on level ground -> the same of both feet here [%]."""
 COMMAND = 1.2
-"""Commanded speed whose walked speed the table tells [m/s]."""
+"""Commanded speed of the walked speed that the table tells [m/s]."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,4 +1,4 @@
-"""Join a Ray cluster, and run independent commands on its nodes; a command whose node dies runs again on another.
+"""Join a Ray cluster, and run independent commands on its nodes; if a node dies, its command runs again on another.
 
 Every node needs springfoot, and the same folders, as commands read and write files.
 """

@@ -49,7 +49,7 @@ from .nodes import ending_waits, joined, tell_of_wait
 from .rllib_network import OBSERVATION_CLIP, ActorCritic, actor_layers
 
 PACKAGES = ("springfoot", "mujoco", "gymnasium", "numpy", "scipy", "torch", "ray")
-"""Packages whose versions decide the result of a training."""
+"""Packages that decide the result of a training by their versions."""
 CHECKPOINT = "ray-"
 """First part of a checkpoint's folder name; the timesteps follow."""
 _RECORD = "springfoot.json"
