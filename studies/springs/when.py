@@ -72,8 +72,9 @@ class When(WalkingStudy):
 
     QUICK: ClassVar[dict[str, Any]] = {
         "episodes": 2,
+        "seconds": 5.0,
         "generations": 1,
-        "population": 3,
+        "population": 2,
         "aims": ("fibre",),
         "pushes": (100.0,),
         "roughness": (),
