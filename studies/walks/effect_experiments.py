@@ -20,7 +20,7 @@ from springfoot.gait.body import TOE_STIFFNESS
 
 from ..feet.both_feet import both, braced
 from .condition_effects import Effect, Measured, change, difference, mean_of, per_unit, share, slope
-from .effect_numbers import FIBRE
+from .effect_numbers import ALL_EFFORT, FIBRE
 from .laboratory import HEAVY_FEET, LOADS, SLOPES, WAIST_LOADS
 
 _SOUND = "sound"
@@ -230,6 +230,7 @@ EXPERIMENTS: dict[str, Experiment | str] = {
         speed=1.25,
         effect=change(FIBRE, 50.0, 0.0),
         beside={f"{k:g} N·m/rad": change(FIBRE, k, 0.0) for k in (100.0, 150.0, 250.0)}
+        | {"250 N·m/rad by effort": change(ALL_EFFORT, 250.0, 0.0)}
         | {f"of it {joint}": share(f"fibre_{joint}_J_kg_m", FIBRE, 50.0, 0.0) for joint in JOINTS},
         also={"less at 250 than at 50": _saves_less_at_250},
     ),
