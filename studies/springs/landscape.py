@@ -41,9 +41,9 @@ AGREEING = 3
 """Persons needed, all in agreement, for a direction to be known."""
 BOTH_STIFFNESSES = ("ankle_N_m_rad", "toe_N_m_rad")
 """Columns of the two stiffnesses."""
-DISTANCE = "angles_rmse_deg"
+ANGLES_RMSE = "angles_rmse_deg"
 """Column of the distance from people: rms of the angles' mean curves from theirs, mean over `COMPARED_JOINTS` [deg]."""
-SEARCHED = {TWO_PRICES[0]: "fibre work", TWO_PRICES[1]: "effort", DISTANCE: "distance from people"}
+SEARCHED = {TWO_PRICES[0]: "fibre work", TWO_PRICES[1]: "effort", ANGLES_RMSE: "distance from people"}
 """Column with a least value that is looked for -> its name."""
 
 
@@ -152,7 +152,7 @@ def _cell_numbers(metrics: Mapping[str, Any], pushed: Mapping[str, Any]) -> dict
         "falls_pushed": price_numbers(pushed)["falls"],
         **numbers,
         **of_joints,
-        DISTANCE: None if None in of_joints.values() else float(np.mean(list(of_joints.values()))),
+        ANGLES_RMSE: None if None in of_joints.values() else float(np.mean(list(of_joints.values()))),
     }
 
 

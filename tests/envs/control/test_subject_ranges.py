@@ -51,7 +51,7 @@ def test_whatever_range_its_slowest_and_fastest_body_may_walk_at_starts(part):
     """A short body at a high speed walks as the settings' tall body would beyond the speeds that it may have."""
     random = np.random.default_rng(0)
     beyond = 0
-    for number in range(100):
+    for number in range(60):
         heights = np.sort(random.uniform(1.2, 2.3, 2))
         fastest = min(2.0, 2.1 * np.sqrt(heights[0] / 1.7))  # beyond, its legs are too short for a step
         speeds = np.sort(random.uniform(0.4, fastest, 2))
@@ -66,7 +66,7 @@ def test_whatever_range_its_slowest_and_fastest_body_may_walk_at_starts(part):
                 assert reference_walk_at(settings, float(speed)).speed == pytest.approx(speed)
             if number % 10 == part:
                 assert len(reference_walks(settings)) == len(grid)
-    assert beyond > 10
+    assert beyond > 6  # a tenth
 
 
 def test_a_grid_ends_at_the_range_where_it_would_leave_what_can_be_planned():

@@ -7,8 +7,8 @@ import pytest
 from springfoot.cli.main import study_main
 from springfoot.studies.feet.walked_speeds import TWO_PRICES
 from springfoot.studies.springs.landscape import (
+    ANGLES_RMSE,
     ANKLES,
-    DISTANCE,
     NOT_DEARER,
     TOES,
     cells_of_least,
@@ -29,7 +29,7 @@ def bowl(best_ankle, best_toe, *, speed=1.1, person="one", missing=()):
             "speed_m_s": speed,
             FIBRE: None if (ankle, toe) in missing else 3.0 + abs(ankle - best_ankle) / 500 + abs(toe - best_toe) / 50,
             EFFORT: None if (ankle, toe) in missing else 5.0 - ankle / 1000 - toe / 1000,
-            DISTANCE: None if (ankle, toe) in missing else 2.0,
+            ANGLES_RMSE: None if (ankle, toe) in missing else 2.0,
         }
         for ankle in ANKLES
         for toe in TOES
