@@ -54,9 +54,9 @@ LEAST_PRECISION = 0.5
 """Half width of K's interval over K beyond which K counts as unknown."""
 REACTION_LEVEL = 0.01
 """Significance at which further states must matter for the verdict `REACTS` (of true springs, 3 % meet it alone)."""
-REACTION_SHARE = 0.02
+REACTION_SHARE = 0.01
 """Fraction of the explained variance that further states must explain beyond K and beta for the verdict `REACTS`: a
-torque a seventh of the spring's."""
+torque a tenth of the spring's."""
 
 SPRING = "spring"
 REACTS = "reacts: not a spring"

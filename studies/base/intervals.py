@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.stats import binomtest, bootstrap, norm, t
+from scipy.stats import binomtest, bootstrap, t
 
 from springfoot.arrays import NDArray
 
@@ -73,12 +73,12 @@ def known_sign(values: Sequence[NDArray]) -> int:
 
 def visible(differences: NDArray) -> float | None:
     """Return the smallest true mean difference that n paired differences (n,) of this spread detect with the chance
-    `POWER`: the sum of the two normal quantiles times the standard error. None for a single difference, and where all
-    are 0."""
+    `POWER`, about: the sum of Student's two quantiles times the standard error. None for a single difference, and where
+    all are 0."""
     if len(differences) < 2 or not differences.any():
         return None
     error = np.std(differences, ddof=1) / np.sqrt(len(differences))
-    return float((norm.ppf(0.5 + LEVEL / 2) + norm.ppf(POWER)) * error)
+    return float(t.ppf([0.5 + LEVEL / 2, POWER], len(differences) - 1).sum() * error)
 
 
 def share_interval(count: int, total: int, level: float = LEVEL) -> tuple[float, float]:

@@ -152,7 +152,7 @@ class Controls(WalkingStudy):
 
     def _commanded_speeds(self) -> Sequence[float]:
         """Return the commanded speeds [m/s]."""
-        return (0.8, 1.0, 1.2) if self.quick else ASKED_SPEEDS
+        return (0.8, 1.0) if self.quick else ASKED_SPEEDS
 
 
 def _control_numbers(recording: Recording) -> dict[str, float | None]:

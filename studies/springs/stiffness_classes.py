@@ -64,12 +64,13 @@ class StiffnessClass:
     def policy(self, vectors: ArrayLike, settings: BipedSettings) -> PolicyFunction:
         """Return the policy for N environments that sets in each the stiffness of its row of `vectors` (N, size).
 
-        K stays within the ranges of the settings. A reflex that is `late` remembers errors: its policy is for one walk.
+        K stays within `RANGES`, for the body. A reflex that is `late` remembers errors: its policy is for one walk.
         """
         ankle, toe, gains = self.split(vectors)
         rows = np.arange(len(ankle))[:, None]  # (N, 1), beside indices (N, side)
         body = body_of(settings)
         centre = np.array(CENTRE) * body.stiffness_scale
+        lowest, highest = np.transpose(RANGES) * body.stiffness_scale
         read: deque[NDArray] = deque(maxlen=self.late + 1)  # the errors of the last steps
 
         def act(observation: NDArray) -> NDArray:
@@ -83,7 +84,7 @@ class StiffnessClass:
                 read.append(observation[:, _ERROR_COLUMNS] / _ERROR_SIZES)
                 of_phase = gains[rows, :, _part_index(self.gains, phase)]  # (N, side, error)
                 logs[..., 0] += (of_phase * read[0][:, None]).sum(-1)
-            action = action_of(centre * np.exp(logs), settings, body)
+            action = action_of(np.clip(centre * np.exp(logs), lowest, highest), settings, body)
             return action.reshape(len(observation), -1).astype(np.float32)
 
         return act

@@ -5,8 +5,9 @@
 Four classes of stiffness, each within the next (`stiffness_classes`): constant, by phase, open loop, linear reflex. At
 each link the inner and the outer class go on from the same stiffness with the same number of walks, by CMA-ES, so that
 both have had equally many; then both walk from starts that no search has walked from, and are compared episode by
-episode. There are two aims, each with its own searches: least fibre work a metre, and least distance from people. At
-last the reflex walks the same test with errors that reach it late.
+episode. The constant class goes on at every link, and is compared with each further class too. There are two aims, each
+with its own searches: least fibre work a metre, and least distance from people. At last the reflex walks the same test
+with errors that reach it late.
 """
 
 from collections.abc import Sequence
@@ -98,8 +99,8 @@ class When(WalkingStudy):
     def total(self) -> float:
         """Return the simulated time of all walks if none falls [s]."""
         links = len(self._classes) - 1
-        searched = (1 + 2 * links) * (self.generations * self.population + 2 * CHOOSING)
-        tested = (2 * links + len(REFLEX_DELAYS)) * len(self._conditions) * self.episodes
+        searched = 3 * links * (self.generations * self.population + 2 * CHOOSING)
+        tested = (3 * links - 1 + len(REFLEX_DELAYS)) * len(self._conditions) * self.episodes
         return len(self.persons) * len(self.aims) * (searched + tested) * self.seconds
 
     def ask(self, progress: OnProgress) -> Answer:
@@ -147,7 +148,8 @@ class When(WalkingStudy):
         self, search: PersonsSearch, aim: str
     ) -> tuple[list[tuple[StiffnessClass, NDArray]], dict[LinkName, Pair]]:
         """Search the classes of each link for an aim; return each class with the vector found, and the test's numbers
-        with both classes of each link. The last links are of the reflex and the same one late."""
+        with both classes of each link. Links are between neighbours, and between the first class and each further
+        one, with equally many walks; the last ones are of the reflex and the same one late."""
         pairs: dict[LinkName, Pair] = {}
 
         def walk(classes: tuple[StiffnessClass, StiffnessClass], vectors: tuple[NDArray, NDArray]) -> None:
@@ -163,11 +165,17 @@ class When(WalkingStudy):
         first, *_ = self._classes
         best = search.search(aim, first, np.zeros(first.size), first)
         found = [(first, best)]
+        constant = best
         for inner, outer in pairwise(self._classes):
             went_on = search.search(aim, inner, best, outer)
             best = search.search(aim, outer, widened(best, inner, outer), outer)
             found.append((outer, best))
             walk((inner, outer), (went_on, best))
+            if inner is first:
+                constant = went_on
+            else:  # the links so far together; the first class, too, was searched at each
+                constant = search.search(aim, first, constant, outer)
+                walk((first, outer), (constant, best))
         *_, reflex = self._classes
         for steps in REFLEX_DELAYS:
             late = replace(reflex, name=f"{1000 * steps * ACTION_STEP:.0f} ms late", late=steps)

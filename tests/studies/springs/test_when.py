@@ -47,7 +47,7 @@ def test_intervals_cover_a_planted_difference_and_pairing_takes_the_starts_out()
 
 def test_a_difference_of_the_smallest_visible_size_is_seen_four_times_in_five():
     spread, episodes = 0.1, 24
-    size = (1.96 + 0.842) * spread / np.sqrt(episodes)
+    size = (2.069 + 0.858) * spread / np.sqrt(episodes)  # Student's t of 23 degrees of freedom, at 97.5 and 80 %
     links = [planted(-size, spread, episodes, seed) for seed in range(100)]
     assert np.mean([interval(link)[1] < 0.0 for link in links]) == pytest.approx(0.8, abs=0.08)
     assert np.mean([link.visible or 0.0 for link in links]) == pytest.approx(size, rel=0.05)
@@ -110,18 +110,20 @@ def test_kept_costs_and_numbers_are_not_walked_again(tmp_path, monkeypatch, caps
     words += ["--keep", str(tmp_path / "kept")]
     assert study_main([*words, "--out", str(tmp_path / "first")]) == 0
     (folder,) = (tmp_path / "kept").iterdir()  # of the person
-    assert len(list(folder.iterdir())) == 1 + 7  # numbers, and the costs of seven searches
+    assert len(list(folder.iterdir())) == 1 + 9  # numbers, and the costs of nine searches
     monkeypatch.setattr("springfoot.studies.springs.class_search._batch", None)  # walking again would fail
     assert study_main([*words, "--out", str(tmp_path / "second")]) == 0
     for name in ("links.csv", "stiffness.csv"):
         assert (tmp_path / "first" / name).read_bytes() == (tmp_path / "second" / name).read_bytes()
     rows = list(csv.DictReader((tmp_path / "first/links.csv").read_text().splitlines()))
-    assert [row["outer"] for row in rows[::3]] == [
-        "per phase",
-        "open loop",
-        "linear reflex",
-        "40 ms late",
-        "80 ms late",
+    assert [(row["inner"], row["outer"]) for row in rows[::3]] == [
+        ("constant", "per phase"),
+        ("per phase", "open loop"),
+        ("constant", "open loop"),
+        ("open loop", "linear reflex"),
+        ("constant", "linear reflex"),
+        ("linear reflex", "40 ms late"),
+        ("linear reflex", "80 ms late"),
     ]
     assert {row["condition"] for row in rows} == {"undisturbed", "±100 N", "rough by 10 mm"}
     assert "constant → per phase" in capsys.readouterr().out
