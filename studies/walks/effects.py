@@ -146,7 +146,7 @@ def effect_row(
             person: _finite_values(experiment.effect(_with_effort(numbers))) for person, numbers in measured.items()
         }
         beside = {
-            name: _mean([_finite_values(effect(numbers)) for numbers in measured.values()])
+            name: _mean_text([_finite_values(effect(numbers)) for numbers in measured.values()])
             for name, effect in experiment.beside.items()
         }
     notes = [experiment.note, *_falls_by_condition(walks.values())]
@@ -171,7 +171,7 @@ def effect_row(
         "walked_m_s": _walked_speed_range(measured.values()),
         "falls": _falls_text([one for own in walks.values() for one in own]),
     }
-    row |= {"beside": "; ".join(f"{name} {_number_text(value)}" for name, value in beside.items()) or None}
+    row |= {"beside": "; ".join(f"{name} {text}" for name, text in beside.items()) or None}
     row |= {"note": "; ".join(filter(None, notes)) or None}
     return row | ({person: _mean([own]) for person, own in values.items()} if len(values) > 1 else {})
 
@@ -207,6 +207,17 @@ def _mean(values: Sequence[NDArray]) -> float | None:
     """Return the mean of all persons' values together; None without any."""
     together = np.concatenate(values)
     return float(together.mean()) if len(together) else None
+
+
+def _mean_text(values: Sequence[NDArray]) -> str:
+    """Return the mean of `of_persons` as text, of several persons with its interval; a dash without any."""
+    sample = of_persons(values)
+    if not len(sample):
+        return MISSING
+    mean = _number_text(float(sample.mean()))
+    if sum(1 for own in values if len(own)) < 2:
+        return mean
+    return f"{mean} ({' to '.join(map(_number_text, interval_of_persons(values)))})"
 
 
 def _walked_speed_range(measured: Iterable[Measured]) -> str:
