@@ -1,20 +1,26 @@
-"""Springs that learn nothing, and our PPO, as submissions to the frozen tasks that set stiffness, for the leaderboard.
+"""Springs that learn nothing, and learners, as submissions to the frozen tasks that set stiffness, for the leaderboard.
 
     make benchmark
+    make benchmark BENCHMARK="--learners sac --tasks Walk-v0"
 
 Each is submitted and judged once, in benchmarks/submissions; the same command goes on after a stop. The best constant
-springs are chosen from `ANKLES` x `TOES` by 24 episodes with seeds that no submission has.
+springs are chosen from `ANKLES` x `TOES` by 24 episodes with seeds that no submission has. Other learners than our PPO
+train by examples/learners/sb3.py, in the virtual environment of `make test-learners`.
 """
 
 import argparse
+import os
+import subprocess
 import sys
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
-from typing import get_args
+from typing import Literal, get_args
 
 from springfoot.agents.policies.baselines import constant
 from springfoot.agents.training import Engine, train_missing
-from springfoot.agents.training.config import task_training
+from springfoot.agents.training.config import processors, task_training
 from springfoot.agents.training.returns import evaluate_returns
 from springfoot.envs import Biped
 from springfoot.errors import SpringfootError, require_count
@@ -22,8 +28,16 @@ from springfoot.evaluation.benchmark.submission import JUDGED, SUBMISSION, judge
 from springfoot.evaluation.benchmark.task_walks import settings_of_task
 from springfoot.tasks import STIFFNESS_TASKS, VERSION
 
+Learner = Literal["ppo", "sb3-ppo", "sac", "tqc"]
+"""Our PPO, and learners of stable-baselines3 and sb3-contrib."""
+NAMES: dict[Learner, str] = {"ppo": "PPO", "sb3-ppo": "PPO of SB3", "sac": "SAC of SB3", "tqc": "TQC of sb3-contrib"}
+"""Learner -> its name in the leaderboard."""
+Run = tuple[str, int]
+"""Task and seed of a training."""
 SUBMISSIONS = Path(__file__).parent / "submissions"
 RUNS = Path("runs", "benchmark")
+SB3_EXAMPLE = Path(__file__).parents[1] / "examples" / "learners" / "sb3.py"
+LEARNERS_VENV = Path("build", "learners", "many")
 ANKLES, TOES = (150.0, 250.0, 400.0, 700.0), (20.0, 40.0, 60.0)
 """Stiffness of the constant springs [N m/rad]."""
 CHOOSING_SEED, CHOOSING_EPISODES = 1000, 24
@@ -51,34 +65,81 @@ def submit_and_judge(policy: str, task: str, name: str, folder: Path) -> None:
         print(f"{task}, {name}: {found.repeated.summary}; drawn: {found.drawn.summary}", flush=True)
 
 
+def label_of(learner: Learner, timesteps: int, seed: int) -> str:
+    """Return the name of a learner's training in folders, such as ppo-500000-seed-0."""
+    return f"{learner}-{timesteps}-seed-{seed}"
+
+
+def train_ours(runs: Sequence[Run], timesteps: int, engine: Engine) -> dict[Run, str]:
+    """Train our PPO as far as that is not done; return the policy of each run."""
+    folders = {run: RUNS / run[0] / label_of("ppo", timesteps, run[1]) for run in runs}
+    jobs = [
+        (replace(task_training(task), seed=seed, timesteps=timesteps), folder, f"{task} seed {seed}")
+        for (task, seed), folder in folders.items()
+    ]
+    if train_missing(jobs, engine) != "finished":
+        sys.exit("a training failed or was stopped; the same command goes on")
+    return {run: str(folder) for run, folder in folders.items()}
+
+
+def train_others(learner: Learner, runs: Sequence[Run], timesteps: int) -> dict[Run, str]:
+    """Train a learner of another library as far as that is not done, as many at a time as there are processors; return
+    the policy of each run."""
+    python = LEARNERS_VENV / "bin" / "python"
+    if not python.is_file():
+        sys.exit(f"no virtual environment {LEARNERS_VENV}; make benchmark makes it")
+    files = {run: RUNS / run[0] / f"{label_of(learner, timesteps, run[1])}.safetensors" for run in runs}
+
+    def train(run: Run) -> None:
+        (task, seed), out = run, files[run]
+        if out.exists():
+            return
+        out.parent.mkdir(parents=True, exist_ok=True)
+        part = out.with_suffix(".part.safetensors")
+        words = ["--algorithm", learner.removeprefix("sb3-"), "--task", task, "--seed", str(seed)]
+        words += ["--timesteps", str(timesteps), "--out", str(part)]
+        with out.with_suffix(".log").open("w") as log:
+            own = os.environ | {"OMP_NUM_THREADS": "1"}
+            subprocess.run([python, SB3_EXAMPLE, *words], check=True, stdout=log, stderr=log, env=own)
+        part.rename(out)
+        print(f"{task}, {learner}, seed {seed}: trained", flush=True)
+
+    with ThreadPoolExecutor(processors()) as pool:
+        list(pool.map(train, runs))
+    return {run: str(file) for run, file in files.items()}
+
+
 def main() -> None:
-    """Submit springs to each task, then PPO of some seeds."""
+    """Submit springs to each task, then the learners' trainings."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    tasks = [f"{name}-{VERSION}" for name in STIFFNESS_TASKS]
+    known = get_args(Learner)
+    parser.add_argument("--learners", nargs="*", choices=known, default=["ppo"], help="who learns (default: ppo, ours)")
+    parser.add_argument("--tasks", nargs="+", choices=tasks, default=tasks, help="tasks (default: all)")
     parser.add_argument("--seeds", type=int, default=5, help="trainings of each task (default: 5)")
     parser.add_argument("--timesteps", type=int, default=500_000, help="of each training (default: 500,000)")
-    parser.add_argument("--engine", choices=get_args(Engine), default="here", help="where to train (default: here)")
+    parser.add_argument("--engine", choices=get_args(Engine), default="here", help="where PPO trains (default: here)")
     flags = parser.parse_args()
-    tasks = [f"{name}-{VERSION}" for name in STIFFNESS_TASKS]
-    runs = [(task, seed, f"ppo-{flags.timesteps}-seed-{seed}") for seed in range(flags.seeds) for task in tasks]
+    runs = [(task, seed) for seed in range(flags.seeds) for task in flags.tasks]
     try:
-        require_count("seeds", flags.seeds, 0)
-        jobs = [
-            (replace(task_training(task), seed=seed, timesteps=flags.timesteps), RUNS / task / label, f"{task} {label}")
-            for task, seed, label in runs
-        ]
+        require_count("seeds", flags.seeds)
+        replace(task_training(flags.tasks[0]), timesteps=flags.timesteps)
     except SpringfootError as error:
         parser.error(str(error))
-    for task in tasks:
+    for task in flags.tasks:
         for policy in ("random", "schedule"):
             submit_and_judge(policy, task, policy, SUBMISSIONS / task / policy)
         if not (SUBMISSIONS / task / "constant" / JUDGED).exists():
             springs = best_constant(task)
             submit_and_judge(springs, task, f"best {springs}", SUBMISSIONS / task / "constant")
-    if train_missing(jobs, flags.engine) != "finished":
-        sys.exit("a training failed or was stopped; the same command goes on")
-    for task, seed, label in runs:
-        name = f"PPO, {flags.timesteps:,} steps, seed {seed}"
-        submit_and_judge(str(RUNS / task / label), task, name, SUBMISSIONS / task / label)
+    for learner in flags.learners:
+        if learner == "ppo":
+            policies = train_ours(runs, flags.timesteps, flags.engine)
+        else:
+            policies = train_others(learner, runs, flags.timesteps)
+        for (task, seed), policy in policies.items():
+            name = f"{NAMES[learner]}, {flags.timesteps:,} steps, seed {seed}"
+            submit_and_judge(policy, task, name, SUBMISSIONS / task / label_of(learner, flags.timesteps, seed))
 
 
 if __name__ == "__main__":

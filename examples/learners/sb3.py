@@ -15,6 +15,7 @@ with exiting_if_missing():
     from stable_baselines3.common.vec_env import VecNormalize
 
     from springfoot.agents import SegmentedFootBipedVecEnv, policy_from_sb3, save_policy
+    from springfoot.tasks import TASKS
 
 TASK: dict[str, Any] = {"episode_seconds": 10.0, "push_newton": 150.0}
 NETWORK = {"net_arch": [64, 64], "activation_fn": torch.nn.Tanh}
@@ -25,12 +26,14 @@ def main(
     algorithm: Literal["ppo", "sac", "tqc"] = "ppo",
     timesteps: int = 131_072,
     seed: int = 0,
+    task: str | None = None,
 ) -> None:
-    """Train, and write the deterministic action as a policy file."""
+    """Train, on a frozen task such as Walk-v0 where one is given; write the deterministic action as a policy file."""
     torch.set_num_threads(1)
     with exiting_if_missing():
         library = import_module("sb3_contrib" if algorithm == "tqc" else "stable_baselines3")
-    envs = VecNormalize(SegmentedFootBipedVecEnv(64 if algorithm == "ppo" else 16, **TASK), gamma=0.98)
+    settings = TASK if task is None else TASKS[task]
+    envs = VecNormalize(SegmentedFootBipedVecEnv(64 if algorithm == "ppo" else 16, **settings), gamma=0.98)
     own: dict[str, Any] = {"learning_starts": 2000, "gradient_steps": 4, "policy_kwargs": NETWORK}
     if algorithm == "ppo":
         noise = {"log_std_init": -0.9}  # gentle: a walker that falls at once learns little

@@ -17,7 +17,8 @@ from springfoot.envs import Biped
 from springfoot.envs.batch.learned_person import person_file
 from springfoot.errors import SpringfootError
 from springfoot.evaluation.benchmark import submission as benchmark
-from springfoot.evaluation.benchmark.leaderboard import judged_rows, leaderboard
+from springfoot.evaluation.benchmark.judged import judged_rows
+from springfoot.evaluation.benchmark.leaderboard import leaderboard
 from springfoot.evaluation.benchmark.task_walks import (
     TaskWalks,
     drawn_seed,
@@ -73,7 +74,8 @@ def test_a_submission_is_judged_to_the_same_bits_on_any_number_of_threads(submit
         told = judged[row.submission.name]
         assert row.return_mean == means[row.submission.name]
         assert (row.drawn_return_mean, row.drawn_falls) == (told["drawn_return_mean"], told["drawn_falls"])
-        assert f"| {' | '.join(row.cells)} |" in leaderboard(kept)
+        numbers = f"{row.return_mean:.0f} | {row.falls} of 100 | {row.drawn_return_mean:.0f} | {row.drawn_falls} of 100"
+        assert f"| {row.submission.name} | {numbers} |" in leaderboard(kept)
     assert main(["judge", str(folders[0])]) == 2  # judged before
     other = {**judged["ours"], "policy_digest": "0" * 64}
     (folders[0] / benchmark.JUDGED).write_bytes(object_with_digest(other))

@@ -1,0 +1,73 @@
+"""Compare learners by the scores of their trainings, as Agarwal et al. (2021, Deep RL at the edge of the statistical
+precipice, NeurIPS) ask: interquartile means with stratified bootstrap intervals, and performance profiles.
+
+A score is 0 for random stiffness, 1 for the best constant springs of the task, and linear in the return.
+"""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from scipy.stats import bootstrap, trim_mean
+
+from springfoot.arrays import NDArray
+
+from .judged import JudgedRow
+
+RESAMPLES = 2000
+"""Resamples of the bootstrap, as in the paper's library, rliable."""
+RANDOM, CONSTANT = "random", "constant"
+"""Baselines at scores 0 and 1."""
+
+Scores = Mapping[str, Mapping[str, NDArray]]
+"""Learner -> task -> (S,) score of each training [-]."""
+
+
+def learner_scores(rows: Sequence[JudgedRow]) -> Scores:
+    """Return the scores of the entries with several trainings, on the tasks that have both baselines."""
+    returns: dict[str, dict[str, list[float]]] = {}
+    ends: dict[tuple[str, str], float] = {}
+    for row in rows:
+        task, kind = row.submission.task, row.submission.policy.partition(":")[0]
+        returns.setdefault(row.entry, {}).setdefault(task, []).append(row.return_mean)
+        if kind in (RANDOM, CONSTANT):
+            ends[kind, task] = max(row.return_mean, ends.get((kind, task), -np.inf))
+    scores = {}
+    for learner, by_task in returns.items():
+        own = {
+            task: (np.array(values) - ends[RANDOM, task]) / (ends[CONSTANT, task] - ends[RANDOM, task])
+            for task, values in by_task.items()
+            if len(values) > 1 and {(RANDOM, task), (CONSTANT, task)} <= ends.keys()
+        }
+        if own:
+            scores[learner] = own
+    return scores
+
+
+def interquartile_mean(*samples: NDArray, axis: int = -1) -> NDArray:
+    """Return the mean of the values between the quartiles of all samples (…, S) together, along `axis`."""
+    return trim_mean(np.concatenate(samples, axis=axis), 0.25, axis=axis)
+
+
+def interval(samples: Sequence[NDArray]) -> tuple[float, float, float]:
+    """Return the interquartile mean of samples (S,), each of one task, and its 95 % interval: each task's trainings
+    are drawn anew among themselves. Of a single value all three are that value."""
+    middle = float(interquartile_mean(*samples))
+    if all(len(sample) < 2 for sample in samples):
+        return middle, middle, middle
+    found = bootstrap(
+        samples, interquartile_mean, n_resamples=RESAMPLES, method="percentile", rng=np.random.default_rng(0)
+    )
+    return middle, float(found.confidence_interval.low), float(found.confidence_interval.high)
+
+
+def interval_text(samples: Sequence[NDArray], pattern: str) -> str:
+    """Return `interval` as text, "middle (low to high)", in the format `pattern`; of a single value the value."""
+    middle, *ends = interval(samples)
+    if sum(map(len, samples)) < 2:
+        return format(middle, pattern)
+    return f"{middle:{pattern}} ({' to '.join(format(end, pattern) for end in ends)})"
+
+
+def profile(samples: Sequence[NDArray], thresholds: NDArray) -> NDArray:
+    """Return the fraction of trainings with a score above each of the thresholds (T,), every task with equal weight."""
+    return np.mean([(sample[:, None] > thresholds).mean(axis=0) for sample in samples], axis=0)
