@@ -22,15 +22,22 @@ Scores = Mapping[str, Mapping[str, NDArray]]
 """Learner -> task -> (S,) score of each training [-]."""
 
 
-def learner_scores(rows: Sequence[JudgedRow]) -> Scores:
-    """Return the scores of the entries with several trainings, on the tasks that have both baselines."""
-    returns: dict[str, dict[str, list[float]]] = {}
+def baseline_returns(rows: Sequence[JudgedRow]) -> dict[tuple[str, str], float]:
+    """Return (baseline, task) -> highest mean return of random stiffness and of constant springs."""
     ends: dict[tuple[str, str], float] = {}
     for row in rows:
         task, kind = row.submission.task, row.submission.policy.partition(":")[0]
-        returns.setdefault(row.entry, {}).setdefault(task, []).append(row.return_mean)
         if kind in (RANDOM, CONSTANT):
             ends[kind, task] = max(row.return_mean, ends.get((kind, task), -np.inf))
+    return ends
+
+
+def learner_scores(rows: Sequence[JudgedRow]) -> Scores:
+    """Return the scores of the entries with several trainings, on the tasks that have both baselines."""
+    ends = baseline_returns(rows)
+    returns: dict[str, dict[str, list[float]]] = {}
+    for row in rows:
+        returns.setdefault(row.entry, {}).setdefault(row.submission.task, []).append(row.return_mean)
     scores = {}
     for learner, by_task in returns.items():
         own = {

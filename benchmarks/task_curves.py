@@ -1,0 +1,92 @@
+"""Draw the learners of the leaderboard: performance profiles over the tasks, and how our PPO's score grows.
+
+    python -m benchmarks.task_curves
+
+It reads the judged submissions and, for the curves, the finished runs of `make benchmark`, and writes
+docs/results/csv/benchmark_curves.csv and docs/results/benchmark.png.
+"""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from matplotlib.figure import Figure
+
+from benchmarks.tasks import RUNS, SUBMISSIONS, label_of
+from springfoot.agents.training import read_record
+from springfoot.arrays import NDArray
+from springfoot.evaluation.benchmark.judged import JudgedRow, judged_rows
+from springfoot.evaluation.benchmark.learner_scores import (
+    CONSTANT,
+    RANDOM,
+    Scores,
+    baseline_returns,
+    interquartile_mean,
+    learner_scores,
+    profile,
+)
+from springfoot.evaluation.report import PNG, STYLE
+from springfoot.files.writing import csv_text
+from springfoot.tasks import STIFFNESS_TASKS, VERSION
+
+RESULTS = Path(__file__).parents[1] / "docs" / "results"
+THRESHOLDS = np.linspace(0.0, 2.0, 201)
+"""Scores at which profiles are drawn."""
+TIMESTEPS, SEEDS = 500_000, 5
+"""Steps and seeds of the runs with curves: the defaults of `make benchmark`."""
+Curves = Mapping[str, tuple[NDArray, NDArray]]
+"""Task -> (E,) environment steps of the periodic evaluations, and (E,) interquartile mean of their scores."""
+
+
+def learning_curves(rows: Sequence[JudgedRow]) -> Curves:
+    """Return the curve of each task with finished runs of all seeds. Scores are linear in the mean return of the run's
+    own evaluation episodes."""
+    ends = baseline_returns(rows)
+    curves = {}
+    for task in (f"{name}-{VERSION}" for name in STIFFNESS_TASKS):
+        folders = [RUNS / task / label_of("ppo", TIMESTEPS, seed) for seed in range(SEEDS)]
+        if all(folder.is_dir() for folder in folders):
+            entries = [read_record(folder)["evaluations"] for folder in folders]
+            returns = np.array([[entry["return_mean"] for entry in own] for own in entries])
+            low, high = ends[RANDOM, task], ends[CONSTANT, task]
+            steps = np.array([entry["timesteps"] for entry in entries[0]])
+            curves[task] = steps, interquartile_mean((returns - low) / (high - low), axis=0)
+    return curves
+
+
+def draw(scores: Scores, curves: Curves, path: Path) -> None:
+    """Draw profiles of the learners that ran on every task beside the learning curves."""
+    with matplotlib.rc_context(STYLE):
+        figure = Figure(figsize=(8.0, 3.2), layout="constrained")
+        profiles, over_steps = figure.subplots(1, 2)
+        for learner, by_task in scores.items():
+            if len(by_task) == len(STIFFNESS_TASKS):
+                profiles.plot(THRESHOLDS, profile(list(by_task.values()), THRESHOLDS), label=learner)
+        profiles.axvline(1.0, color="0.6", linewidth=0.8)
+        profiles.set(xlabel="score", ylabel="fraction of trainings above it", ylim=(0, 1.02))
+        profiles.legend(frameon=False)
+        for task, (steps, middle) in curves.items():
+            over_steps.plot(steps / 1e6, middle, label=task)
+        over_steps.axhline(1.0, color="0.6", linewidth=0.8)
+        over_steps.set(xlabel="environment steps (millions)", ylabel="score of our PPO")
+        over_steps.legend(frameon=False, fontsize=7)
+        figure.savefig(path, dpi=110, **PNG)
+
+
+def main() -> None:
+    """Write the curves' CSV and the picture."""
+    rows = judged_rows(SUBMISSIONS)
+    curves = learning_curves(rows)
+    lines = [
+        [task, int(step), f"{value:.4f}"]
+        for task, (steps, middle) in curves.items()
+        for step, value in zip(steps, middle, strict=True)
+    ]
+    text = csv_text(["task", "timesteps", "score"], lines)
+    (RESULTS / "csv" / "benchmark_curves.csv").write_text(text, encoding="utf-8")
+    draw(learner_scores(rows), curves, RESULTS / "benchmark.png")
+
+
+if __name__ == "__main__":
+    main()
