@@ -31,10 +31,10 @@ NO_WALK = 3 * FALL_COST
 """Cost of a stiffness with which no stride could be measured."""
 FIRST_SPREAD = 0.2
 """First spread of a search, in ln K and in gains; chosen."""
-CHOOSING = 4
-"""Walks on which a search's result is held against its beginning; chosen."""
-TEST_SEED = 500_000
-"""Difference of the first seed of the test from the first one of the searches."""
+CHOOSING_SEED, TEST_SEED = 250_000, 500_000
+"""Difference of the first seed of the walks that choose, and of the test, from the first one of the searches."""
+SEEDS_OF_A_SEARCH = 1000
+"""Seeds that each search has for its own starts; chosen, more than its generations."""
 
 
 class Condition(NamedTuple):
@@ -53,6 +53,10 @@ class Condition(NamedTuple):
         return f"rough by {1000 * self.unevenness_m:g} mm" if self.unevenness_m else UNDISTURBED_WALK
 
 
+Candidate = tuple[StiffnessClass, NDArray]
+"""Class of stiffness, and one of its vectors."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class PersonsSearch:
     """Searches and tests of one person, with kept costs and numbers."""
@@ -62,11 +66,12 @@ class PersonsSearch:
     seconds: float
     """Length of each episode."""
     seed: int
-    """Generation g walks from the start of seed + g, the test's episode i from that of seed + `TEST_SEED` + i."""
-    generations: int
-    """Generations of each search."""
+    """Generation g of search n walks from the start of seed + `SEEDS_OF_A_SEARCH` n + g, the test's episode i from that
+    of seed + `TEST_SEED` + i."""
     population: int
     """Candidates of each generation; each walks one episode, pushed."""
+    choosing: int
+    """Walks by which one of several vectors is chosen, pushed likewise."""
     push_newton: float
     """Size of these pushes [N]."""
     threads: int
@@ -78,33 +83,48 @@ class PersonsSearch:
     progress: OnProgress
     """Function called with the simulated time [s] of each step."""
 
-    def search(self, aim: str, of_class: StiffnessClass, start: NDArray, link: StiffnessClass) -> NDArray:
-        """Search the class `of_class` from the vector `start`, for the link with the outer class `link`; return the
-        vector found: the search's mean at the end, or `start` if that costs no more on other walks.
+    def search(
+        self, aim: str, of_class: StiffnessClass, start: NDArray, number: int, generations_: int, free: slice
+    ) -> NDArray:
+        """Search the class `of_class` from the vector `start`; return the vector found, the search's mean at the end.
 
-        Costs in `folder` and in `kept` are not computed again.
+        Entries beside `free` stay. `number` tells the searches for an aim apart: each has its own starts and random
+        numbers. Costs in `folder` are not computed again.
         """
+
+        def whole(entries: NDArray) -> NDArray:
+            """Return the vector with these entries in `free`."""
+            vector = start.copy()
+            vector[free] = entries
+            return vector
+
+        first_seed = self.seed + SEEDS_OF_A_SEARCH * number
 
         def costs_of(generation: int, vectors: list[NDArray]) -> NDArray:
             """Return the costs of a generation; its candidates all walk from the same start."""
-            return self._costs(aim, of_class, vectors, self.seed + generation, 1)
+            return self._costs(aim, of_class, list(map(whole, vectors)), first_seed + generation, 1)
 
-        options = {"popsize": self.population, "seed": self.seed + 1, "verbose": -9}
-        strategy = cma.CMAEvolutionStrategy(start, FIRST_SPREAD, options)
-        question = [*self._in_question, aim, of_class.name, link.name, start.tolist()]
-        name = f"{aim}-{link.name}-{of_class.name}.json".replace(" ", "-")
-        file = None if self.folder is None else self.folder / name
-        for _ in generations(strategy, self.generations, costs_of, file, question):
+        options = {"popsize": self.population, "seed": first_seed + 1, "verbose": -9}
+        strategy = cma.CMAEvolutionStrategy(start[free], FIRST_SPREAD, options)
+        question = [*self._in_question, aim, of_class.name, number, start.tolist()]
+        file = None if self.folder is None else self.folder / f"{aim}-{number}.json"
+        for _ in generations(strategy, generations_, costs_of, file, question):
             pass
-        ends = [start, np.asarray(strategy.mean)]
-        first_seed = self.seed + TEST_SEED // 2
+        return whole(np.asarray(strategy.mean))
 
-        def costs_of_ends() -> dict[str, Any]:
-            """Return the costs of start and mean on walks that the generations did not have."""
-            return {"costs": self._costs(aim, of_class, ends, first_seed, CHOOSING).tolist()}
+    def choose(self, aim: str, candidates: Sequence[Candidate]) -> Candidate:
+        """Return the candidate that costs least on `choosing` walks that no search has; of equal ones the first."""
+        costs = []
+        for of_class, vector in candidates:
 
-        asked = [*question, [end.tolist() for end in ends]]
-        return ends[int(np.argmin(self.kept.get(asked, costs_of_ends)["costs"]))]
+            def cost_of(of_class: StiffnessClass = of_class, vector: NDArray = vector) -> dict[str, Any]:
+                """Return the cost of one candidate."""
+                cost = self._costs(aim, of_class, [vector], self.seed + CHOOSING_SEED, self.choosing)
+                return {"cost": float(cost[0])}
+
+            asked = [*self._in_question, aim, of_class.name, vector.tolist(), self.choosing]
+            costs.append(self.kept.get(asked, cost_of)["cost"])
+        return candidates[int(np.argmin(costs))]
 
     def test_numbers(
         self, of_class: StiffnessClass, vector: NDArray, condition: Condition, episodes: int

@@ -55,6 +55,11 @@ class StiffnessClass:
         """Return the number of entries of a vector."""
         return len(self.ankle) + len(self.toe) + len(ERRORS) * len(self.gains)
 
+    @property
+    def reflex(self) -> slice:
+        """Return the place of the gains in a vector."""
+        return slice(len(self.ankle) + len(self.toe), self.size)
+
     def split(self, vectors: ArrayLike) -> tuple[NDArray, NDArray, NDArray]:
         """Return the parts of vectors (..., size): ankle (..., parts), toe (..., parts), gains (..., errors, parts)."""
         vectors = np.asarray(vectors, float)

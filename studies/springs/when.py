@@ -4,16 +4,17 @@
 
 Four classes of stiffness, each within the next (`stiffness_classes`): constant, by phase, open loop, linear reflex. At
 each link the inner and the outer class go on from the same stiffness with the same number of walks, by CMA-ES, so that
-both have had equally many; then both walk from starts that no search has walked from, and are compared episode by
-episode. The constant class goes on at every link, and is compared with each further class too. There are two aims, each
-with its own searches: least fibre work a metre, and least distance from people. At last the reflex walks the same test
-with errors that reach it late.
+both have had equally many. From all that was found, the classes within included, each class then takes the stiffness
+that costs least on walks of their own. Both walk a test from further starts, and are compared episode by episode. The
+constant class goes on at every link, and is compared with each further class too. There are two aims, each with its own
+searches: least fibre work a metre, and least distance from people. At last the reflex walks the same test with errors
+that reach it late.
 """
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
-from itertools import pairwise
+from itertools import count, pairwise
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, get_args
 
@@ -32,7 +33,7 @@ from springfoot.files.writing import csv_text
 from ..base.intervals import POWER
 from ..base.kept import Kept, known_as
 from ..base.study import Answer, OnProgress, WalkingStudy
-from .class_search import CHOOSING, TEST_SEED, Condition, PersonsSearch
+from .class_search import TEST_SEED, Candidate, Condition, PersonsSearch
 from .links import Aim, Link, Pair, compared, fewest_falls, links_table, verdict
 from .stiffness_classes import StiffnessClass, nested_classes, widened
 
@@ -44,6 +45,8 @@ EVERYONE = "all"
 """Person of the comparisons over all persons."""
 LinkName = tuple[str, tuple[str, str], str]
 """Aim, names of both classes, and condition in words."""
+WHOLE = slice(None)
+"""All entries of a vector."""
 Found = tuple[str, str, StiffnessClass, NDArray]
 """Person, aim, class, and its vector that was found."""
 
@@ -59,9 +62,11 @@ class When(WalkingStudy):
     seconds: float = 6.0
     """Length of each episode."""
     generations: int = 10
-    """Generations of each search."""
+    """Generations of each search of the first link; the second has half as many more, the third twice as many."""
     population: int = 10
     """Candidates of each generation; each walks one episode, pushed."""
+    choosing: int = 20
+    """Walks, pushed likewise, by which a class takes one of the stiffnesses found."""
     aims: tuple[Aim, ...] = get_args(Aim)
     """Aims of the searches: least fibre work, likeness, or both apart."""
     pushes: tuple[float, ...] = (100.0, 200.0, 300.0)
@@ -76,6 +81,7 @@ class When(WalkingStudy):
         "seconds": 5.0,
         "generations": 1,
         "population": 2,
+        "choosing": 1,
         "aims": ("fibre",),
         "pushes": (100.0,),
         "roughness": (),
@@ -85,7 +91,7 @@ class When(WalkingStudy):
     def check(self) -> None:
         """Refuse counts, lengths, pushes and unevenness out of range."""
         super().check()
-        for name, least in (("generations", 1), ("population", 2)):
+        for name, least in (("generations", 1), ("population", 2), ("choosing", 1)):
             require_count(name, getattr(self, name), least, MOST_COUNT)
         require_count("pushes", len(self.pushes))
         for push in self.pushes:
@@ -99,7 +105,8 @@ class When(WalkingStudy):
     def total(self) -> float:
         """Return the simulated time of all walks if none falls [s]."""
         links = len(self._classes) - 1
-        searched = 3 * links * (self.generations * self.population + 2 * CHOOSING)
+        searches = [0, 0, 0] + [link for link in range(1, links) for _ in range(3)]  # the link of each
+        searched = sum(map(self._generations_of, searches)) * self.population + (len(searches) + 1) * self.choosing
         tested = (3 * links - 1 + len(REFLEX_DELAYS)) * len(self._conditions) * self.episodes
         return len(self.persons) * len(self.aims) * (searched + tested) * self.seconds
 
@@ -135,8 +142,8 @@ class When(WalkingStudy):
             person=person,
             seconds=self.seconds,
             seed=self.seed,
-            generations=self.generations,
             population=self.population,
+            choosing=self.choosing,
             push_newton=self.pushes[0],
             threads=self.threads,
             folder=folder,
@@ -151,36 +158,46 @@ class When(WalkingStudy):
         with both classes of each link. Links are between neighbours, and between the first class and each further
         one, with equally many walks; the last ones are of the reflex and the same one late."""
         pairs: dict[LinkName, Pair] = {}
+        numbers = count()
 
-        def walk(classes: tuple[StiffnessClass, StiffnessClass], vectors: tuple[NDArray, NDArray]) -> None:
-            """Walk the test under each condition with two classes, each by its vector."""
-            names = (classes[0].name, classes[1].name)
+        def walk(names: tuple[str, str], candidates: tuple[Candidate, Candidate]) -> None:
+            """Walk the test under each condition with the stiffness found for two classes with these `names`."""
             for condition in self._conditions:
-                inner, outer = (
-                    search.test_numbers(of_class, vector, condition, self.episodes)
-                    for of_class, vector in zip(classes, vectors, strict=True)
-                )
+                inner, outer = (search.test_numbers(*one, condition, self.episodes) for one in candidates)
                 pairs[aim, names, condition.words] = inner, outer
 
-        first, *_ = self._classes
-        best = search.search(aim, first, np.zeros(first.size), first)
-        found = [(first, best)]
-        constant = best
-        for inner, outer in pairwise(self._classes):
-            went_on = search.search(aim, inner, best, outer)
-            best = search.search(aim, outer, widened(best, inner, outer), outer)
-            found.append((outer, best))
-            walk((inner, outer), (went_on, best))
-            if inner is first:
-                constant = went_on
-            else:  # the links so far together; the first class, too, was searched at each
-                constant = search.search(aim, first, constant, outer)
-                walk((first, outer), (constant, best))
-        *_, reflex = self._classes
+        def went_on(of_class: StiffnessClass, begin: Candidate, link: int, free: slice = WHOLE) -> Candidate:
+            """Search a class from a stiffness that it has, with the walks of a link; return the one found."""
+            start = widened(begin[1], begin[0], of_class)
+            return of_class, search.search(aim, of_class, start, next(numbers), self._generations_of(link), free)
+
+        first, *_ = classes = self._classes
+        middle = (first, np.zeros(first.size))
+        constants = [middle, went_on(first, middle, 0)]
+        best = search.choose(aim, constants)
+        found = [best]
+        for link, (inner, outer) in enumerate(pairwise(classes)):
+            constants.append(went_on(first, search.choose(aim, constants), link))
+            constant = search.choose(aim, constants)
+            of_inner = [constant] if inner is first else [constant, best, went_on(inner, best, link)]
+            reflex_alone = outer.reflex if outer.gains and not inner.gains else WHOLE
+            searched = went_on(outer, best, link, reflex_alone)
+            inner_best = search.choose(aim, of_inner)
+            best = search.choose(aim, [inner_best, searched])
+            found.append((outer, widened(best[1], best[0], outer)))
+            walk((inner.name, outer.name), (inner_best, best))
+            if inner is not first:
+                walk((first.name, outer.name), (constant, best))
+        reflex, vector = found[-1]
         for steps in REFLEX_DELAYS:
             late = replace(reflex, name=f"{1000 * steps * ACTION_STEP:.0f} ms late", late=steps)
-            walk((reflex, late), (best, best))
+            walk((reflex.name, late.name), ((reflex, vector), (late, vector)))
         return found, pairs
+
+    def _generations_of(self, link: int) -> int:
+        """Return the generations of each search of a link, counted from 0: each link has half the first one's more,
+        as its classes have more numbers."""
+        return self.generations * (2 + link) // 2
 
     def _text(self, links: Sequence[Link]) -> str:
         """Return the report: verdict, a table of links for each aim, and a note."""
@@ -199,10 +216,12 @@ class When(WalkingStudy):
                 "at every link and condition. Outer less inner class: undisturbed, paired, with its 95 % interval "
                 f"({several}), and in brackets the smallest difference seen with a chance of {100 * POWER:g} %. Falls "
                 f"of inner, outer: episodes in which one alone falls show a difference {seen} (McNemar). Each search "
-                f"walks {self.generations} × {self.population} candidates, pushed by ±{self.pushes[0]:g} N. A reflex "
-                "plus a network is left out. A late reflex is the same one, whose errors are of 40 or 80 ms before. "
-                "A difference of exactly 0: no search of the link found better than its "
-                "start, which says little of what a longer one would find.",
+                f"walks {' or '.join(str(self._generations_of(link)) for link in range(len(self._classes) - 1))} × "
+                f"{self.population} candidates, by link, pushed by ±{self.pushes[0]:g} N; {self.choosing} such walks "
+                "choose what a class takes. The search for a reflex moves its gains alone. A reflex plus a network is "
+                "left out. A late reflex is the same one, whose errors are of 40 or 80 ms before. A difference of "
+                "exactly 0: the outer class takes the inner one's stiffness, as its search found none better, which "
+                "says little of what a longer one would find.",
             ]
         )
 

@@ -106,7 +106,7 @@ def test_quick_has_every_link(tmp_path, capsys):
 @pytest.mark.slow
 def test_kept_costs_and_numbers_are_not_walked_again(tmp_path, monkeypatch, capsys):
     words = ["when", "--generations", "1", "--population", "2", "--episodes", "2", "--aims", "likeness"]
-    words += ["--pushes", "100", "--roughness", "0.01", "--seconds", "5.5", "--threads", "1"]
+    words += ["--choosing", "1", "--pushes", "100", "--roughness", "0.01", "--seconds", "5.5", "--threads", "1"]
     words += ["--keep", str(tmp_path / "kept")]
     assert study_main([*words, "--out", str(tmp_path / "first")]) == 0
     (folder,) = (tmp_path / "kept").iterdir()  # of the person
