@@ -230,7 +230,7 @@ EXPERIMENTS: dict[str, Experiment | str] = {
         speed=1.25,
         effect=change(FIBRE, 50.0, 0.0),
         beside={f"{k:g} N·m/rad": change(FIBRE, k, 0.0) for k in (100.0, 150.0, 250.0)}
-        | {"250 N·m/rad by effort": change(ALL_EFFORT, 250.0, 0.0)}
+        | {f"{k:g} N·m/rad by effort": change(ALL_EFFORT, k, 0.0) for k in (50.0, 250.0)}
         | {f"of it {joint}": share(f"fibre_{joint}_J_kg_m", FIBRE, 50.0, 0.0) for joint in JOINTS},
         also={"less at 250 than at 50": _saves_less_at_250},
     ),

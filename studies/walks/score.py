@@ -6,9 +6,11 @@
 The numbers are those of `springfoot evaluate`, by the same functions, of each leg and of both together.
 """
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -104,7 +106,8 @@ class Score(MotionFiles):
             f"angles, moments and forces as one, in the SD that each publication used. {PUBLISHED.as_posix()} has the "
             "curves of each, its source and its licence.",
         ]
-        return Answer(text="\n\n".join(text), files={"score.csv": scores_csv(numbers, people)})
+        files = {"score.csv": scores_csv(numbers, people), "score.json": scores_json(numbers)}
+        return Answer(text="\n\n".join(text), files=files)
 
 
 def curves_by_side(measured: MeasuredPerson) -> dict[str, dict[str, NDArray]]:
@@ -170,6 +173,23 @@ def scores_csv(numbers: Mapping[str, Scores], people: Scores) -> str:
         for curve, name in order
     )
     return csv_text(["curve", "number", *numbers, "people"], rows)
+
+
+def scores_json(numbers: Mapping[str, Scores]) -> str:
+    """Return the numbers as JSON with the keys `joints`, `grf` and `moments` of metrics.json: of both legs together, or
+    of the one there is, and below `per_leg` of each leg."""
+
+    def keyed(of_side: Scores) -> dict[str, Any]:
+        """Return the numbers of one side by the keys of metrics.json."""
+        return {
+            "joints": {joint: of_side[joint] for joint in ANGLE_JOINTS if joint in of_side},
+            "grf": of_side.get("grf", {}),
+            "moments": {joint: of_side[name] for joint in MOMENT_JOINTS if (name := f"{joint}_moment") in of_side},
+        }
+
+    *_, last = numbers.values()
+    per_leg = {side: keyed(of_side) for side, of_side in numbers.items() if side != "both"}
+    return f"{json.dumps(keyed(last) | {'per_leg': per_leg}, indent=2, allow_nan=False)}\n"
 
 
 def published_table(numbers: Scores, speed: float | None) -> str:

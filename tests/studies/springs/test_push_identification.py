@@ -1,5 +1,6 @@
 """The laboratory's experiment: known springs are found from pushes, and a policy that reacts is called so."""
 
+from collections import deque
 from dataclasses import replace
 from functools import cache
 
@@ -117,6 +118,19 @@ def test_a_stiffness_that_acts_late_is_found_or_no_spring(delay):
     late = identified(samples(pushed("schedule", stiffness_delay_s=delay), 1.0))
     errors = errors_of_springs(late)
     assert max(map(abs, errors.values())) < 0.05 and len(errors) < len(loaded(late))
+
+
+def test_a_stiffness_decided_7_percent_of_the_stride_before_it_acts_is_found_or_no_spring():
+    policy, settings = prepare_pushed("schedule", PUSHES)
+    decided = deque(maxlen=5)  # actions of this step and of the four before, 80 ms
+
+    def late(observation):
+        decided.append(policy(observation))
+        return decided[0]
+
+    rows = identified(samples(record(late, settings, name="late", episodes=64, threads=1), 1.0))
+    errors = errors_of_springs(rows)
+    assert max(map(abs, errors.values())) < 0.05 and len(errors) >= 6
 
 
 def test_a_weak_reaction_to_the_body_is_no_spring():

@@ -1,6 +1,7 @@
 """The command `springfoot score`: evaluations come back from their files, people score as people, bad input is told."""
 
 import csv
+import json
 
 import numpy as np
 import pytest
@@ -60,6 +61,14 @@ def test_an_exported_episode_scores_as_its_evaluation(tmp_path, capsys):
     )
     for joint in ("hip", "knee", "ankle"):
         assert float(rows[f"{joint}_moment", "r"]["both"]) == pytest.approx(metrics["moments"][joint]["r"], abs=0.002)
+    told_again = json.loads((tmp_path / "score" / "score.json").read_text(encoding="utf-8"))
+    for joint, of_joint in told_again["joints"].items():
+        assert of_joint["rmse_deg"] == pytest.approx(metrics["joints"][joint]["rmse_deg"], abs=0.02)
+    assert told_again["grf"]["vertical_r"] == pytest.approx(metrics["grf"]["vertical_r"], abs=0.002)
+    assert told_again["moments"]["ankle"]["peak_Nm_kg"] == pytest.approx(
+        metrics["moments"]["ankle"]["peak_Nm_kg"], rel=0.01
+    )
+    assert told_again["per_leg"].keys() == {"left", "right"}
     told = capsys.readouterr().out
     assert f"{metrics['strides']['count'] // 2} left" in told and "Left out: the first 3 s." in told
 
