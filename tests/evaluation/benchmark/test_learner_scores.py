@@ -1,19 +1,31 @@
 """Scores of learners: 0 for random stiffness, 1 for the best constant springs, interquartile means over the seeds."""
 
-from types import SimpleNamespace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from springfoot.evaluation.benchmark.judged import JudgedRow
 from springfoot.evaluation.benchmark.learner_scores import interval, interval_text, learner_scores, profile
+from springfoot.evaluation.benchmark.submission import Submission
+from springfoot.evaluation.benchmark.task_walks import EPISODES, TaskWalks
 from springfoot.tasks import STIFFNESS_TASKS, VERSION
 
 WALK, PUSHED = f"Walk-{VERSION}", f"Pushed-{VERSION}"
 
 
-def row(entry, task, policy, return_mean):
-    """Return a judged row as far as scores read it."""
-    return SimpleNamespace(entry=entry, submission=SimpleNamespace(task=task, policy=policy), return_mean=return_mean)
+def row(name, task, policy, return_mean):
+    """Return a judged submission, with the numbers that scores read."""
+    walks = TaskWalks(returns=np.full(EPISODES, return_mean), fell=np.zeros(EPISODES, bool))
+    submission = Submission(folder=Path(), name=name, task=task, policy=policy, digest="", walks=walks)
+    return JudgedRow(
+        submission=submission, return_mean=return_mean, falls=0, drawn_return_mean=return_mean, drawn_falls=0
+    )
+
+
+def trainings(name, task, *returns):
+    """Return the judged submissions of a learner, one for each seed."""
+    return [row(f"{name}, seed {seed}", task, "policy", value) for seed, value in enumerate(returns)]
 
 
 ENDS = [
@@ -24,15 +36,13 @@ ENDS = [
 
 
 def test_a_score_is_linear_between_random_and_the_best_constant_springs():
-    learners = [row("ours", WALK, "policy", value) for value in (100.0, 300.0, 500.0)]
-    scores = learner_scores([*ENDS, *learners])
+    scores = learner_scores([*ENDS, *trainings("ours", WALK, 100.0, 300.0, 500.0)])
     assert scores.keys() == {"ours"}
     np.testing.assert_allclose(scores["ours"][WALK], [0.0, 1.0, 2.0], atol=1e-12)
 
 
 def test_one_training_has_no_spread_and_a_task_without_baselines_no_score():
-    rows = [*ENDS, row("once", WALK, "policy", 400.0), *(row("ours", PUSHED, "policy", each) for each in (1.0, 2.0))]
-    assert learner_scores(rows) == {}
+    assert learner_scores([*ENDS, *trainings("once", WALK, 400.0), *trainings("ours", PUSHED, 1.0, 2.0)]) == {}
 
 
 def test_the_outer_quarters_do_not_count():
@@ -46,9 +56,9 @@ def test_trainings_are_drawn_anew_within_their_task():
     assert interval([np.zeros(2), np.ones(2)]) == (0.5, 0.5, 0.5)
 
 
-@pytest.mark.parametrize(("trainings", "text"), [([2.5], "2.5"), ([2.0, 2.0], "2.0 (2.0 to 2.0)")])
-def test_a_single_training_is_told_without_an_interval(trainings, text):
-    assert interval_text([np.array(trainings)], ".1f") == text
+@pytest.mark.parametrize(("values", "text"), [([2.5], "2.5"), ([2.0, 2.0], "2.0 (2.0 to 2.0)")])
+def test_a_single_training_is_told_without_an_interval(values, text):
+    assert interval_text([np.array(values)], ".1f") == text
 
 
 def test_a_profile_is_the_fraction_of_trainings_above_with_each_task_alike():
