@@ -58,7 +58,7 @@ def save_gait_figure(path: Path, recording: Recording, gait: Gait) -> None:
     if feet_differ(settings):
         legs = tuple(zip(gait.feet, (MODEL, OTHER_LEG), strict=True))
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(12.5, 10.2), layout="constrained")
+        figure = Figure(figsize=(12.5, 10.2), dpi=130, layout="constrained")
         grid = figure.subplots(4, 4)  # rows: angles; moments; two forces, two of the CoM; springs
         for ax, (joint, column) in zip(grid[0], ANGLE_COLUMNS.items(), strict=True):
             _draw_angle(ax, legs, human, joint, column, metrics["joints"][joint])
@@ -71,14 +71,15 @@ def save_gait_figure(path: Path, recording: Recording, gait: Gait) -> None:
         for ax in [*grid[0], *grid[1], *grid[2, :2], *grid[3]]:
             _stride_axis(ax, metrics["toe_off_percent"], 100 * human.toe_off)
         _write_header(figure, recording, gait, human)
-        figure.savefig(path, dpi=130, **PNG)
+        _lay_out(figure)
+        figure.savefig(path, dpi="figure", **PNG)
 
 
 def save_stiffness_figure(path: Path, gait: Gait) -> None:
     """Draw the stiffness K of ankles and toes over the stride into the picture `path`, each foot by itself."""
     legs: Legs = tuple(zip(gait.feet, (MODEL, OTHER_LEG), strict=True))
     with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(9.0, 3.2), layout="constrained")
+        figure = Figure(figsize=(9.0, 3.2), dpi=130, layout="constrained")
         axes = figure.subplots(1, 2)
         _draw_stiffness(axes, legs)
         for ax in axes:
@@ -88,7 +89,16 @@ def save_stiffness_figure(path: Path, gait: Gait) -> None:
             for name, (_, colour) in zip(SIDES, legs, strict=True)
         }
         figure.legend(list(handles.values()), list(handles), loc="outside lower center", ncols=2, frameon=False)
-        figure.savefig(path, dpi=130, **PNG)
+        _lay_out(figure)
+        figure.savefig(path, dpi="figure", **PNG)
+
+
+def _lay_out(figure: Figure) -> None:
+    """Give the panels of a figure their places for good: `savefig` would draw all of it twice, once for the layout."""
+    layout = figure.get_layout_engine()
+    if layout is not None:
+        layout.execute(figure)
+    figure.set_layout_engine(None)
 
 
 def _draw_angle(ax: Axes, legs: Legs, human: HumanGait, joint: str, column: str, numbers: dict) -> None:
