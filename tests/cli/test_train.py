@@ -228,7 +228,7 @@ def test_what_to_type_next_depends_on_what_was_learned():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_ctrl_c_leaves_a_usable_policy_and_a_run_to_go_on_with(tmp_path, number):
+def test_ctrl_c_leaves_a_usable_policy_and_a_run_to_go_on_with(monkeypatch, tmp_path, number):
     folder = tmp_path / "run"
     command = [sys.executable, SCRIPT, "--out", folder, "--timesteps", "10_000_000", *SHORT]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
@@ -252,9 +252,7 @@ def test_ctrl_c_leaves_a_usable_policy_and_a_run_to_go_on_with(tmp_path, number)
     assert action.shape == (4,) and (abs(action) <= 1).all()
     if number == signal.SIGINT:
         done = record["timesteps"]
-        again = [sys.executable, SCRIPT, "--resume", folder, "--timesteps", "1000"]
-        resumed = subprocess.run(again, capture_output=True, text=True)
-        assert resumed.returncode == 0, resumed.stderr
+        assert main(monkeypatch, "--resume", folder, "--timesteps", 1000) == 0
         assert json.loads((folder / RUN).read_text())["timesteps"] == done + 1024
 
 
