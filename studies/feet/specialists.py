@@ -38,8 +38,8 @@ CELLS: dict[str, Mapping[str, Any]] = {
     "both calves of 25 %": both({"kind": "weak", "strength": 0.25}),
 }
 """Name of a cell -> its feet."""
-QUICK_CELLS = 2
-"""Cells walked with --quick, the first."""
+QUICK_CELLS, QUICK_STEPS = 2, 1920
+"""Cells walked with --quick, the first, and steps of each training there, one update."""
 LEARNED_SECONDS = PRESETS["person"].environment.episode_seconds
 """Length of an episode of the trainings [s]."""
 LEARNING = {"learning_rate": 1.2e-4, "log_std": -2.3, "critic_steps": 300_000}
@@ -61,7 +61,7 @@ class Specialists(WalkingStudy):
     runs: Annotated[Path, tyro.conf.arg(metavar="FOLDER")] = Path("runs/specialists")
     """Folder of the trainings; after a stop the same command goes on there."""
 
-    QUICK: ClassVar[Mapping[str, Any]] = {**WalkingStudy.QUICK, "timesteps": 15_360}
+    QUICK: ClassVar[Mapping[str, Any]] = {**WalkingStudy.QUICK, "timesteps": QUICK_STEPS}
     UNIT: ClassVar[str] = " trainings"
 
     def check(self) -> None:
@@ -108,10 +108,12 @@ class Specialists(WalkingStudy):
         """Return the training of a person's specialist: the preset's, but with the person's prices, under the
         conditions of an evaluation."""
         _, environment = person_and_settings(person, {"episode_seconds": LEARNED_SECONDS, **feet})
+        preset = PRESETS["person"]
         return replace(
-            PRESETS["person"],
+            preset,
             **LEARNING,
             timesteps=self.timesteps,
+            update_steps=QUICK_STEPS if self.quick else preset.update_steps,
             seed=self.training_seed,
             threads=self.threads,
             eval_interval=max(1, self.timesteps // EVALUATIONS),
