@@ -38,6 +38,8 @@ PLAN_SPEEDS: dict[float, float | None] = {1.2: None, 1.05: 1.2, 0.9: 1.05, 1.35:
 style for all speeds a walk changes with speed otherwise than people's."""
 NEXT_SPREAD = 0.2
 """First spread of a search that begins at another speed's style, in units of the search; chosen."""
+QUICK_STEPS = 1920
+"""Steps of the training with --quick, one update."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,7 +67,7 @@ class Predict(WalkingStudy):
         "plan_generations": 1,
         "next_generations": 1,
         "population": 4,
-        "timesteps": PRESETS["predict"].update_steps,
+        "timesteps": QUICK_STEPS,
     }
     UNIT: ClassVar[str] = " generations"
 
@@ -118,6 +120,7 @@ class Predict(WalkingStudy):
         return replace(
             preset,
             timesteps=self.timesteps,
+            update_steps=QUICK_STEPS if self.quick else preset.update_steps,
             seed=self.training_seed,
             threads=self.threads,
             environment=replace(preset.environment, plan_file=str(self.folder / FOUND)),
