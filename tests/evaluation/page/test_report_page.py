@@ -302,7 +302,7 @@ def test_several_policies_have_a_folder_each_and_one_page(tmp_path, monkeypatch,
     for name in names[1::2]:
         head = "percent,ankle_stiffness_Nm_per_rad,toe_stiffness_Nm_per_rad"
         (tmp_path / name).write_text(f"{head}\n0,300,40\n", encoding="utf-8")
-    words = [*names, "--episodes", "1", "--seconds", "2"]
+    words = [*names, "--episodes", "1", "--seconds", "1"]
     assert evaluate_main(words) == 0
     assert {path.name for path in tmp_path.iterdir()} == {"...csv", "report.html.csv", "runs"}
     labels = ["schedule", "policy", "schedule-2", "report.html-2"]

@@ -241,7 +241,7 @@ def test_evaluate_names_the_command_of_the_copy_and_walks_it(tmp_path, monkeypat
     monkeypatch.chdir(tmp_path)
     told = []
     for name in ("pretrained", "frozen:pretrained"):  # of the schedule: test_report.py
-        assert evaluate_main([name, "--episodes", "1", "--seconds", "5"]) == 0
+        assert evaluate_main([name, "--episodes", "1", "--seconds", "1"]) == 0
         told.append("open loop: evaluate.py frozen:pretrained, with the same flags" in capsys.readouterr().out)
     assert told == [True, False]
     assert (tmp_path / "runs" / "eval-frozen-pretrained-1" / "metrics.json").is_file()
