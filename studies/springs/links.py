@@ -144,12 +144,12 @@ def verdict(links: Sequence[Link]) -> str:
         here = [link for link in links if link.aim == aim and link.condition == UNDISTURBED_WALK]
         seen = [link for link in here if link.high is not None and link.high < 0.0]
         gains = [
-            f"{link.outer} {link.difference:+.3f} [{link.low:.3f}, {link.high:.3f}] {UNIT_OF_AIM[aim]} "
+            f"{link.inner} → {link.outer} {link.difference:+.3f} [{link.low:.3f}, {link.high:.3f}] {UNIT_OF_AIM[aim]} "
             f"({100 * link.difference / link.inner_mean:+.1f} %)"
             for link in seen
             if link.difference is not None and link.inner_mean is not None
         ]
-        others = [link.outer for link in here if link not in seen]
+        others = [f"{link.inner} → {link.outer}" for link in here if link not in seen]
         better = f"better than the class within: {', '.join(gains)}" if gains else "none is better"
         rest = f"; not better: {', '.join(others)}" if gains and others else ""
         sentences.append(f"For {aim}, undisturbed, {better}{rest}.")

@@ -3,12 +3,12 @@
     springfoot study when learned learned-2 learned-3 --keep runs/when
 
 Four classes of stiffness, each within the next (`stiffness_classes`): constant, by phase, open loop, linear reflex. At
-each link the inner and the outer class go on from the same stiffness with the same number of walks, by CMA-ES, so that
-both have had equally many. From all that was found, the classes within included, each class then takes the stiffness
-that costs least on walks of their own. Both walk a test from further starts, and are compared episode by episode. The
-constant class goes on at every link, and is compared with each further class too. There are two aims, each with its own
-searches: least fibre work a metre, and least distance from people. At last the reflex walks the same test with errors
-that reach it late.
+each link the inner and the outer class go on from the same stiffness with the same number of walks, by CMA-ES; so does
+the constant class. In the end each class takes, of all that any search found in it or in a class within it, the
+stiffness that costs least on walks that no search had. All four walk a test from further starts, and are compared
+episode by episode, neighbours and each with the constant class. There are two aims, each with its own searches: least
+fibre work a metre, and least distance from people. At last the reflex walks the same test with errors that reach it
+late.
 """
 
 from collections.abc import Sequence
@@ -61,7 +61,7 @@ class When(WalkingStudy):
     """Episodes of each person, class and condition of the test."""
     seconds: float = 6.0
     """Length of each episode."""
-    generations: int = 10
+    generations: int = 12
     """Generations of each search of the first link; the second has half as many more, the third twice as many."""
     population: int = 10
     """Candidates of each generation; each walks one episode, pushed."""
@@ -107,7 +107,7 @@ class When(WalkingStudy):
         links = len(self._classes) - 1
         searches = [0, 0, 0] + [link for link in range(1, links) for _ in range(3)]  # the link of each
         searched = sum(map(self._generations_of, searches)) * self.population + (len(searches) + 1) * self.choosing
-        tested = (3 * links - 1 + len(REFLEX_DELAYS)) * len(self._conditions) * self.episodes
+        tested = (len(self._classes) + len(REFLEX_DELAYS)) * len(self._conditions) * self.episodes
         return len(self.persons) * len(self.aims) * (searched + tested) * self.seconds
 
     def ask(self, progress: OnProgress) -> Answer:
@@ -119,9 +119,9 @@ class When(WalkingStudy):
         for person in self.persons:
             search = self._search_of(person, progress)
             for aim in self.aims:
-                of_classes, pairs = self._search_links(search, aim)
-                found += [(person, aim, *one) for one in of_classes]
-                for name, pair in pairs.items():
+                best = self._search_classes(search, aim)
+                found += [(person, aim, *one) for one in best]
+                for name, pair in self._test_links(search, aim, best).items():
                     walks.setdefault(name, []).append(pair)
                     links.append(compared(person, *name, [pair]))
         if len(self.persons) > 1:
@@ -151,48 +151,59 @@ class When(WalkingStudy):
             progress=progress,
         )
 
-    def _search_links(
-        self, search: PersonsSearch, aim: str
-    ) -> tuple[list[tuple[StiffnessClass, NDArray]], dict[LinkName, Pair]]:
-        """Search the classes of each link for an aim; return each class with the vector found, and the test's numbers
-        with both classes of each link. Links are between neighbours, and between the first class and each further
-        one, with equally many walks; the last ones are of the reflex and the same one late."""
-        pairs: dict[LinkName, Pair] = {}
-        numbers = count()
+    def _search_classes(self, search: PersonsSearch, aim: str) -> list[tuple[StiffnessClass, NDArray]]:
+        """Search the classes of each link for an aim; return each class with the best vector found in it.
 
-        def walk(names: tuple[str, str], candidates: tuple[Candidate, Candidate]) -> None:
-            """Walk the test under each condition with the stiffness found for two classes with these `names`."""
-            for condition in self._conditions:
-                inner, outer = (search.test_numbers(*one, condition, self.episodes) for one in candidates)
-                pairs[aim, names, condition.words] = inner, outer
+        All that searches found is held against each other by the same walks; a class within has its find in each
+        further class too."""
+        numbers = count()
+        classes = self._classes
+        first, *_ = classes
+        middle = (first, np.zeros(first.size))
 
         def went_on(of_class: StiffnessClass, begin: Candidate, link: int, free: slice = WHOLE) -> Candidate:
             """Search a class from a stiffness that it has, with the walks of a link; return the one found."""
             start = widened(begin[1], begin[0], of_class)
             return of_class, search.search(aim, of_class, start, next(numbers), self._generations_of(link), free)
 
-        first, *_ = classes = self._classes
-        middle = (first, np.zeros(first.size))
-        constants = [middle, went_on(first, middle, 0)]
-        best = search.choose(aim, constants)
-        found = [best]
+        found: dict[str, list[Candidate]] = {of_class.name: [] for of_class in classes}
+        found[first.name] = [middle, went_on(first, middle, 0)]
+
+        def best_of(of_class: StiffnessClass) -> Candidate:
+            """Return the best found so far in a class or in a class within it."""
+            within = classes[: classes.index(of_class) + 1]
+            return search.choose(aim, [one for each in within for one in found[each.name]])
+
         for link, (inner, outer) in enumerate(pairwise(classes)):
-            constants.append(went_on(first, search.choose(aim, constants), link))
-            constant = search.choose(aim, constants)
-            of_inner = [constant] if inner is first else [constant, best, went_on(inner, best, link)]
+            begin = best_of(inner)
+            for of_class in dict.fromkeys((first, inner)):
+                found[of_class.name].append(went_on(of_class, best_of(of_class), link))
             reflex_alone = outer.reflex if outer.gains and not inner.gains else WHOLE
-            searched = went_on(outer, best, link, reflex_alone)
-            inner_best = search.choose(aim, of_inner)
-            best = search.choose(aim, [inner_best, searched])
-            found.append((outer, widened(best[1], best[0], outer)))
-            walk((inner.name, outer.name), (inner_best, best))
-            if inner is not first:
-                walk((first.name, outer.name), (constant, best))
-        reflex, vector = found[-1]
-        for steps in REFLEX_DELAYS:
-            late = replace(reflex, name=f"{1000 * steps * ACTION_STEP:.0f} ms late", late=steps)
-            walk((reflex.name, late.name), ((reflex, vector), (late, vector)))
-        return found, pairs
+            found[outer.name].append(went_on(outer, begin, link, reflex_alone))
+        best = [best_of(of_class) for of_class in classes]
+        return [
+            (of_class, widened(vector, own, of_class)) for of_class, (own, vector) in zip(classes, best, strict=True)
+        ]
+
+    def _test_links(
+        self, search: PersonsSearch, aim: str, best: Sequence[tuple[StiffnessClass, NDArray]]
+    ) -> dict[LinkName, Pair]:
+        """Return the test's numbers with both classes of each link, by its name: links between neighbours, between the
+        first class and each further one, and of the reflex and the same one late."""
+        reflex, gains = best[-1]
+        late = [
+            replace(reflex, name=f"{1000 * steps * ACTION_STEP:.0f} ms late", late=steps) for steps in REFLEX_DELAYS
+        ]
+        links = [*pairwise(best), *((best[0], outer) for outer in best[2:])]
+        links += [((reflex, gains), (one, gains)) for one in late]
+        return {
+            (aim, (inner[0].name, outer[0].name), condition.words): (
+                search.test_numbers(*inner, condition, self.episodes),
+                search.test_numbers(*outer, condition, self.episodes),
+            )
+            for inner, outer in links
+            for condition in self._conditions
+        }
 
     def _generations_of(self, link: int) -> int:
         """Return the generations of each search of a link, counted from 0: each link has half the first one's more,
@@ -220,8 +231,7 @@ class When(WalkingStudy):
                 f"{self.population} candidates, by link, pushed by ±{self.pushes[0]:g} N; {self.choosing} such walks "
                 "choose what a class takes. The search for a reflex moves its gains alone. A reflex plus a network is "
                 "left out. A late reflex is the same one, whose errors are of 40 or 80 ms before. A difference of "
-                "exactly 0: the outer class takes the inner one's stiffness, as its search found none better, which "
-                "says little of what a longer one would find.",
+                "exactly 0: no search found better than the class within has, which says little of longer ones.",
             ]
         )
 
