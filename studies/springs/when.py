@@ -57,7 +57,7 @@ class When(WalkingStudy):
 
     persons: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="PERSON ...")] = ("learned",)
     """Policies that move the person, and stay as they are: run folders, files, or those such as `learned`."""
-    episodes: int = 12
+    episodes: int = 40
     """Episodes of each person, class and condition of the test."""
     seconds: float = 6.0
     """Length of each episode."""
