@@ -20,7 +20,7 @@ from springfoot.evaluation.benchmark.judged import JudgedRow, judged_rows
 from springfoot.evaluation.benchmark.learner_scores import (
     CONSTANT,
     RANDOM,
-    Scores,
+    LearnerScores,
     baseline_returns,
     interquartile_mean,
     learner_scores,
@@ -55,7 +55,7 @@ def learning_curves(rows: Sequence[JudgedRow]) -> Curves:
     return curves
 
 
-def draw(scores: Scores, curves: Curves, path: Path) -> None:
+def draw(scores: LearnerScores, curves: Curves, path: Path) -> None:
     """Draw profiles of the learners that ran on every task beside the learning curves."""
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(8.0, 3.2), layout="constrained")

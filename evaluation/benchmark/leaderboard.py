@@ -12,7 +12,7 @@ from springfoot.files.markdown import MISSING, table
 from springfoot.tasks import STIFFNESS_TASKS, TASKS, VERSION
 
 from .judged import JudgedRow, judged_rows
-from .learner_scores import Scores, interval, interval_text, learner_scores
+from .learner_scores import LearnerScores, interval, interval_text, learner_scores
 from .task_walks import EPISODES
 
 MOST_ROWS = 8
@@ -51,7 +51,7 @@ def _cells(name: str, rows: Sequence[JudgedRow]) -> list[str]:
     ]
 
 
-def _scores_section(scores: Scores) -> str:
+def _scores_section(scores: LearnerScores) -> str:
     """Return the Markdown section of the learners' scores: a row for each task that sets stiffness; empty without."""
     if not scores:
         return ""

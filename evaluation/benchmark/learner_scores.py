@@ -13,12 +13,12 @@ from springfoot.arrays import NDArray
 
 from .judged import JudgedRow
 
-RESAMPLES = 2000
+_RESAMPLES = 2000
 """Resamples of the bootstrap, as in the paper's library, rliable."""
 RANDOM, CONSTANT = "random", "constant"
 """Baselines at scores 0 and 1."""
 
-Scores = Mapping[str, Mapping[str, NDArray]]
+LearnerScores = Mapping[str, Mapping[str, NDArray]]
 """Learner -> task -> (S,) score of each training [-]."""
 
 
@@ -32,7 +32,7 @@ def baseline_returns(rows: Sequence[JudgedRow]) -> dict[tuple[str, str], float]:
     return ends
 
 
-def learner_scores(rows: Sequence[JudgedRow]) -> Scores:
+def learner_scores(rows: Sequence[JudgedRow]) -> LearnerScores:
     """Return the scores of the entries with several trainings, on the tasks that have both baselines."""
     ends = baseline_returns(rows)
     returns: dict[str, dict[str, list[float]]] = {}
@@ -62,7 +62,7 @@ def interval(samples: Sequence[NDArray]) -> tuple[float, float, float]:
     if all(len(sample) < 2 for sample in samples):
         return middle, middle, middle
     found = bootstrap(
-        samples, interquartile_mean, n_resamples=RESAMPLES, method="percentile", rng=np.random.default_rng(0)
+        samples, interquartile_mean, n_resamples=_RESAMPLES, method="percentile", rng=np.random.default_rng(0)
     )
     return middle, float(found.confidence_interval.low), float(found.confidence_interval.high)
 

@@ -11,7 +11,7 @@ fibre work a metre, and least distance from people. At last the reflex walks the
 late.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from itertools import count, pairwise
@@ -118,12 +118,14 @@ class When(WalkingStudy):
         links = []
         for person in self.persons:
             search = self._search_of(person, progress)
-            for aim in self.aims:
-                best = self._search_classes(search, aim)
-                found += [(person, aim, *one) for one in best]
-                for name, pair in self._test_links(search, aim, best).items():
-                    walks.setdefault(name, []).append(pair)
-                    links.append(compared(person, *name, [pair]))
+            best = {aim: self._search_classes(search, aim) for aim in self.aims}
+            found += [(person, aim, *one) for aim, of_aim in best.items() for one in of_aim]
+            pairs = {name: pair for aim in self.aims for name, pair in self._test_links(search, aim, best[aim]).items()}
+            if len(best) > 1:
+                pairs |= self._price_of_likeness(search, best)
+            for name, pair in pairs.items():
+                walks.setdefault(name, []).append(pair)
+                links.append(compared(person, *name, [pair]))
         if len(self.persons) > 1:
             links = [compared(EVERYONE, *name, pairs) for name, pairs in walks.items()] + links
         files = {
@@ -202,6 +204,21 @@ class When(WalkingStudy):
                 search.test_numbers(*outer, condition, self.episodes),
             )
             for inner, outer in links
+            for condition in self._conditions
+        }
+
+    def _price_of_likeness(
+        self, search: PersonsSearch, best: Mapping[Aim, Sequence[tuple[StiffnessClass, NDArray]]]
+    ) -> dict[LinkName, Pair]:
+        """Return the test's numbers with the constant class found for fibre work and with each class found for
+        likeness, by name: they tell the fibre work that likeness costs."""
+        cheapest, *_ = best["fibre"]
+        return {
+            ("fibre", (f"{cheapest[0].name} for fibre", f"{outer[0].name} for likeness"), condition.words): (
+                search.test_numbers(*cheapest, condition, self.episodes),
+                search.test_numbers(*outer, condition, self.episodes),
+            )
+            for outer in best["likeness"]
             for condition in self._conditions
         }
 

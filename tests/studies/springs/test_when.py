@@ -108,18 +108,22 @@ def test_quick_has_every_link(tmp_path, capsys):
 
 @pytest.mark.slow
 def test_kept_costs_and_numbers_are_not_walked_again(tmp_path, monkeypatch, capsys):
-    words = ["when", "--generations", "1", "--population", "2", "--episodes", "2", "--aims", "likeness"]
+    words = ["when", "--generations", "1", "--population", "2", "--episodes", "2"]
     words += ["--choosing", "1", "--pushes", "100", "--roughness", "0.01", "--seconds", "5.5", "--threads", "1"]
     words += ["--keep", str(tmp_path / "kept")]
     assert study_main([*words, "--out", str(tmp_path / "first")]) == 0
     (folder,) = (tmp_path / "kept").iterdir()  # of the person
-    assert len(list(folder.iterdir())) == 1 + 9  # numbers, and the costs of nine searches
+    assert len(list(folder.iterdir())) == 1 + 2 * 9  # numbers, and the costs of nine searches for each aim
     monkeypatch.setattr("springfoot.studies.springs.class_search._batch", None)  # walking again would fail
     assert study_main([*words, "--out", str(tmp_path / "second")]) == 0
     for name in ("links.csv", "stiffness.csv"):
         assert (tmp_path / "first" / name).read_bytes() == (tmp_path / "second" / name).read_bytes()
     rows = list(csv.DictReader((tmp_path / "first/links.csv").read_text().splitlines()))
-    assert [(row["inner"], row["outer"]) for row in rows[::3]] == [
+    price = [row for row in rows if row["outer"].endswith("for likeness")]
+    assert {row["inner_mean"] for row in price if row["condition"] == "undisturbed"} == {rows[0]["inner_mean"]}
+    assert price[0]["outer"] == "constant for likeness" and len(price) == 4 * 3
+    likeness = [row for row in rows if row["aim"] == "likeness"]
+    assert [(row["inner"], row["outer"]) for row in likeness[::3]] == [
         ("constant", "per phase"),
         ("per phase", "open loop"),
         ("open loop", "linear reflex"),
