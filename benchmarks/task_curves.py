@@ -6,6 +6,7 @@ It reads the judged submissions and, for the curves, the finished runs of `make 
 docs/results/csv/benchmark_curves.csv and docs/results/benchmark.png.
 """
 
+import argparse
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -76,6 +77,7 @@ def draw(scores: LearnerScores, curves: Curves, path: Path) -> None:
 
 def main() -> None:
     """Write the curves' CSV and the picture."""
+    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
     rows = judged_rows(SUBMISSIONS)
     curves = learning_curves(rows)
     lines = [
