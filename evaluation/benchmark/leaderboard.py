@@ -62,9 +62,11 @@ def _scores_section(scores: LearnerScores) -> str:
         lines.append([task, *("not run" if each is None else interval_text([each], ".2f") for each in own)])
     whole = [[by_task[task] for task in tasks] if {*tasks} <= by_task.keys() else None for by_task in scores.values()]
     lines.append(["all", *(MISSING if each is None else interval_text(each, ".2f") for each in whole)])
-    above = [task for task in tasks if any(interval([own[task]])[1] > 1.0 for own in scores.values() if task in own)]
-    below = [task for task in tasks if task not in above]
+    run = [task for task in tasks if any(task in own for own in scores.values())]
+    above = [task for task in run if any(task in own and interval([own[task]])[1] > 1.0 for own in scores.values())]
     words = [f"Better than the best constant springs, with all of an interval: {', '.join(above) or 'nowhere'}."]
-    if below:
-        words.append(f"Not: {', '.join(below)}.")
+    if below := [task for task in run if task not in above]:
+        words.append(f"Not better: {', '.join(below)}.")
+    if len(run) < len(tasks):
+        words.append("`make benchmark` trains our PPO where no learner has run.")
     return f"## Learners\n\n{table(['score', *scores], lines)}\n\n{' '.join(words)}"

@@ -118,7 +118,9 @@ class When(WalkingStudy):
         links = []
         for person in self.persons:
             search = self._search_of(person, progress)
-            best = {aim: self._search_classes(search, aim) for aim in self.aims}
+            best: dict[Aim, list[tuple[StiffnessClass, NDArray]]] = {
+                aim: self._search_classes(search, aim) for aim in self.aims
+            }
             found += [(person, aim, *one) for aim, of_aim in best.items() for one in of_aim]
             pairs = {name: pair for aim in self.aims for name, pair in self._test_links(search, aim, best[aim]).items()}
             if len(best) > 1:

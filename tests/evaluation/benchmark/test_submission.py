@@ -298,6 +298,22 @@ def test_a_table_has_eight_rows_and_says_how_many_more_there_are(submitted, tmp_
     assert board.endswith("2 more are not shown.")
 
 
+def test_trainings_of_one_learner_are_one_entry_with_a_score(submitted, tmp_path):
+    entries = [("random", "random", 1.0), ("springs", "constant:300,40", 3.0)]
+    entries += [(f"ours, seed {seed}", "schedule", 4.0 + seed) for seed in (0, 1)]
+    for name, policy, mean in entries:
+        entered(submitted[1], tmp_path / name, first_return=mean, mean=mean)
+        own = {"policy": policy, "policy_digest": sha256(policy.encode()).hexdigest()}
+        values = read_object(tmp_path / name / benchmark.SUBMISSION, "submission") | own
+        (tmp_path / name / benchmark.SUBMISSION).write_bytes(object_with_digest(values))
+        judged = read_object(tmp_path / name / benchmark.JUDGED, "judgement") | own
+        (tmp_path / name / benchmark.JUDGED).write_bytes(object_with_digest(judged))
+    board = leaderboard(tmp_path)
+    assert f"| {TASK} | 1.75 (1.50 to 2.00) |" in board  # 4 and 5, where random returns 1 and springs 3
+    assert f"with all of an interval: {TASK}. `make benchmark` trains our PPO" in board
+    assert "| ours (2 seeds) | 4 (4 to 5) |" in board and "seed 0" not in board
+
+
 def test_a_table_is_in_the_order_of_returns(submitted, tmp_path):
     for name, mean in (("low", 1.0), ("high", 3.0), ("between", 2.0)):
         entered(submitted[1], tmp_path / name, first_return=mean, mean=mean)
