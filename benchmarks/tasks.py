@@ -91,6 +91,7 @@ def train_others(learner: Learner, runs: Sequence[Run], timesteps: int) -> dict[
     files = {run: RUNS / run[0] / f"{label_of(learner, timesteps, run[1])}.safetensors" for run in runs}
 
     def train(run: Run) -> None:
+        """Train one run in a process of its own, unless its policy is there."""
         (task, seed), out = run, files[run]
         if out.exists():
             return

@@ -1,4 +1,4 @@
-"""Read the judged submissions below a folder: what the leaderboard is made from."""
+"""Read the judged submissions below a folder, the rows of the leaderboard."""
 
 import re
 from dataclasses import dataclass
