@@ -67,7 +67,7 @@ def main() -> None:
             open_live(*words)
         else:
             run(*words)
-    run("springfoot", "datasets", "--sets", "random", "--episodes", "2")
+    run("springfoot", "datasets", "random", "--episodes", "2")
     run("springfoot", "examples", "--copy", "examples")
     for name, words in EXAMPLES.items():
         (path,) = Path("examples").rglob(name)

@@ -2,10 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated
+
+import tyro
 
 from springfoot.command_line import end_in_order, exit_code, parse
-from springfoot.errors import SpringfootError, require_count
+from springfoot.errors import require_count
 from springfoot.files.markdown import table
 
 MOST_EPISODES = 10_000
@@ -14,13 +16,19 @@ MOST_EPISODES = 10_000
 
 @dataclass(frozen=True, kw_only=True)
 class DatasetsFlags:
-    """Write walks as Minari sets springfoot/walk/NAME-v0, for learners that see no environment.
+    """Write walks on a frozen task as Minari sets springfoot/TASK/POLICY-v0, for learners that see no environment.
 
     Minari keeps them in ~/.minari, or in the folder of the variable MINARI_DATASETS_PATH.
     """
 
-    sets: tuple[Literal["expert", "medium", "random"], ...] = ("expert", "medium", "random")
-    """Policies that walk: `pretrained`, the same training stopped early, and random actions."""
+    policies: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="POLICY ...")] = (
+        "expert",
+        "medium",
+        "random",
+    )
+    """Policies that walk, a set each: .safetensors files, run folders, those of the package, or baselines."""
+    task: str = "Walk-v0"
+    """Frozen task of the benchmark."""
     episodes: int = 200
     """Episodes of each set, of ten seconds or until a fall."""
     seed: int = 0
@@ -36,18 +44,17 @@ def datasets_main(arguments: Sequence[str] | None = None, program: str = "spring
 def run_datasets(flags: DatasetsFlags) -> None:
     """Write the sets; print the number of episodes, steps and falls in each, and its mean return."""
     from springfoot.compiling import tell_of_compiling
-    from springfoot.evaluation.recording.minari_sets import set_id, write_sets  # not above: help needs no simulator
+    from springfoot.evaluation.benchmark.minari_sets import write_sets  # not above: help needs no simulator
 
     require_count("episodes", flags.episodes, 1, MOST_EPISODES)
     require_count("seed", flags.seed, 0)
-    if not flags.sets or len(set(flags.sets)) < len(flags.sets):
-        raise SpringfootError("give --sets each set once, of expert, medium and random")
     end_in_order()
     tell_of_compiling()
-    summaries = write_sets(flags.sets, flags.episodes, flags.seed)
+    summaries = write_sets(flags.policies, flags.task, flags.episodes, flags.seed)
     rows = [
-        [set_id(name), str(row["episodes"]), f"{row['steps']:,}", f"{row['return_mean']:.0f}", str(row["falls"])]
-        for name, row in summaries.items()
+        [own, str(row["episodes"]), f"{row['steps']:,}", f"{row['return_mean']:.0f}", str(row["falls"])]
+        for own, row in summaries.items()
     ]
     print(table(["set", "episodes", "steps", "mean return", "falls"], rows))
-    print(f'\nNext:    python -c "import minari; print(minari.load_dataset({set_id(flags.sets[0])!r}).total_episodes)"')
+    first = next(iter(summaries))
+    print(f'\nNext:    python -c "import minari; print(minari.load_dataset({first!r}).total_episodes)"')

@@ -33,7 +33,7 @@ class EvaluateFlags:
 
     policies: Annotated[tyro.conf.Positional[tuple[str, ...]], tyro.conf.arg(metavar="POLICY ...")]
     """A .safetensors or .onnx file, a run folder (its best policy), module:function (your own code, of observations
-    (N, D) or (D,); it is imported and run), or one of: pretrained, medium, predicted, learned, learned-2 to
+    (N, D) or (D,); it is imported and run), or one of: pretrained, expert, medium, predicted, learned, learned-2 to
     learned-5, untrained, random, constant (300/40 N m/rad; constant:ANKLE,TOE for others), schedule (of the leg tuning,
     or --schedule; schedule:FACTOR for a multiple), quasi_stiffness, thesis, thesis_printed. A .csv or .json file is a
     stiffness schedule or a table of finite states, as an evaluation writes them. frozen:POLICY is a trained policy's

@@ -1,6 +1,6 @@
 """Clone the expert of a Minari set by least squares of its actions, without an environment, and write a policy file.
 
-springfoot datasets --sets expert
+springfoot datasets expert
 python examples/clone_from_minari.py --out clone.safetensors
 springfoot evaluate clone.safetensors
 """

@@ -12,10 +12,15 @@ from .policy import PRETRAINED_BY, SHIPPED, find_policy, read_policy
 
 MADE = {
     "pretrained": ("Walks on level ground at 1.2 m/s, and goes on when it is pushed.", f"`{PRETRAINED_BY}`", "walk"),
+    "expert": (
+        "Sets the stiffness on the frozen task Walk-v0, where `learned` walks; a set for offline learning.",
+        "`springfoot train --task Walk-v0 --timesteps 500000 --out runs/expert`",
+        "leaderboard",
+    ),
     "medium": (
-        "Walks, and lags behind when pushed: a training stopped early, for sets of offline learning.",
-        "`springfoot train --push-newton 250 --timesteps 500000 --out runs/medium`",
-        "walk",
+        "The same after a fifth of the training, worse than the best constant springs; another such set.",
+        "`springfoot train --task Walk-v0 --timesteps 100000 --out runs/medium`",
+        "leaderboard",
     ),
     **{
         name: (

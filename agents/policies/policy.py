@@ -53,6 +53,7 @@ BEST, LAST = "best.safetensors", "last.safetensors"
 _PRETRAINED = Path(str(resources.files("springfoot.agents"))) / "pretrained"
 SHIPPED = {
     "pretrained": _PRETRAINED / "walk.safetensors",
+    "expert": _PRETRAINED / "expert.safetensors",
     "medium": _PRETRAINED / "medium.safetensors",
     **{name: person_file(name) for name in LEARNED if name != "learned-1"},  # that one is `learned`
 }

@@ -216,7 +216,7 @@ COMMANDS = [
     (["evaluate", "schedule", "--seconds", "1e6"], 'springfoot evaluate: error: a recording must be of at most 100,000 s in all, got 20 episodes of 1e+06 s'),
     (["evaluate", *["schedule"] * 9], 'springfoot evaluate: error: report.html shows up to 8 policies, got 9; give --no-report'),
     (["evaluate", "schedule", "--height", "1e308"], 'springfoot evaluate: error: height must be in [1, 2.3] m, got 1e+308'),
-    (["evaluate", "x\x1b[31m"], "springfoot evaluate: error: no policy 'x\\x1b[31m': give a .safetensors or .onnx file, a run folder, a schedule in a .csv or .json file, module:function, frozen:POLICY, or one of pretrained, medium, learned, learned-2, learned-3, learned-4, learned-5, predicted, untrained, random, constant, schedule, quasi_stiffness, thesis, thesis_printed"),
+    (["evaluate", "x\x1b[31m"], "springfoot evaluate: error: no policy 'x\\x1b[31m': give a .safetensors or .onnx file, a run folder, a schedule in a .csv or .json file, module:function, frozen:POLICY, or one of pretrained, expert, medium, learned, learned-2, learned-3, learned-4, learned-5, predicted, untrained, random, constant, schedule, quasi_stiffness, thesis, thesis_printed"),
     (["evaluate", "schedule", "--human", "a\x1b[31m.csv"], 'springfoot evaluate: error: no file a\\x1b[31m.csv'),
     (["evaluate", "schedule", "--ankle-stiffness-range", "1e-300", "1e300"], 'springfoot evaluate: error: ankle_stiffness_range must be within [0.001, 100000] N m/rad, got (1e-300, 1e+300)'),
     (["evaluate", "schedule", "--schedule", '{"ankle": "' + "x" * 400 + '"}'], "springfoot evaluate: error: a stiffness schedule must be an object with keys ankle and toe, got {'ankle': 'xxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxx"),

@@ -66,7 +66,7 @@ TRAIN = [
 ]
 POLICIES = (
     "give a .safetensors or .onnx file, a run folder, a schedule in a .csv or .json file, module:function, frozen:POLICY, "
-    "or one of pretrained, medium, learned, learned-2, learned-3, learned-4, learned-5, predicted, untrained, random, constant, schedule, "
+    "or one of pretrained, expert, medium, learned, learned-2, learned-3, learned-4, learned-5, predicted, untrained, random, constant, schedule, "
     "quasi_stiffness, thesis, thesis_printed"
 )
 COMMANDS_IN_WORDS = "train, evaluate, live, feet, person, score, export, submit, judge, study, datasets, examples and completion"
@@ -81,7 +81,7 @@ CASES = [
     (["evaluate", "pretraind"], f"springfoot evaluate: error: no policy 'pretraind': {POLICIES}; perhaps pretrained?"),
     (["live", "schedul:1.2"], f"springfoot live: error: no policy 'schedul:1.2': {POLICIES}; perhaps schedule?"),
     (["evaluate", "zzz"], f"springfoot evaluate: error: no policy 'zzz': {POLICIES}"),
-    (["export", "predictd", "--out", "new.onnx"], "springfoot export: error: no policy predictd: give a .safetensors or .onnx file, a run folder, module:function, or one of pretrained, medium, learned, learned-2, learned-3, learned-4, learned-5, predicted; perhaps predicted?"),
+    (["export", "predictd", "--out", "new.onnx"], "springfoot export: error: no policy predictd: give a .safetensors or .onnx file, a run folder, module:function, or one of pretrained, expert, medium, learned, learned-2, learned-3, learned-4, learned-5, predicted; perhaps predicted?"),
     (["study", "compare", "schedule", "--epochs", "3"], "springfoot study compare: error: unrecognized options: --epochs, 3"),
 ]
 # fmt: on

@@ -126,7 +126,7 @@ def test_example_does_what_it_says(name, tmp_path, monkeypatch):
         pytest.importorskip("optuna", reason="needs Optuna: pip install optuna")
     if name == "clone_from_minari.py":
         monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
-        assert main(["datasets", "--sets", "random", "--episodes", "2"]) == 0
+        assert main(["datasets", "random", "--episodes", "2"]) == 0
     command = [sys.executable, "-W", "error", str(EXAMPLES / name), *words]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

@@ -207,7 +207,7 @@ ERRORS = [
     (
         "frozen:nobody",
         "no policy 'nobody': give a .safetensors or .onnx file, a run folder, a schedule in a .csv or .json file, "
-        "module:function, frozen:POLICY, or one of pretrained, medium, learned, learned-2, learned-3, "
+        "module:function, frozen:POLICY, or one of pretrained, expert, medium, learned, learned-2, learned-3, "
         "learned-4, learned-5, predicted, "
         f"{', '.join(BASELINES)}",
     ),

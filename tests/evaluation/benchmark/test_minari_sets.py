@@ -16,7 +16,7 @@ from springfoot.agents.training.returns import evaluate_returns
 from springfoot.cli.main import main
 from springfoot.envs import Biped
 from springfoot.errors import SpringfootError
-from springfoot.evaluation.recording.minari_sets import walked_episodes, write_sets
+from springfoot.evaluation.benchmark.minari_sets import set_id, walked_episodes, write_sets
 
 EXAMPLE = Path(__file__).parents[3] / "examples" / "clone_from_minari.py"
 
@@ -28,8 +28,8 @@ def folder(tmp_path, monkeypatch):
 
 
 def test_an_episode_is_what_its_environment_gives_for_its_seed_and_actions(folder):
-    told = write_sets(["random"], 3, seed=5)["random"]
-    dataset = minari.load_dataset("springfoot/walk/random-v0")
+    told = write_sets(["random"], "Slopes-v0", 3, seed=5)["springfoot/slopes/random-v0"]
+    dataset = minari.load_dataset("springfoot/slopes/random-v0")
     environment = dataset.recover_environment()
     episodes = list(dataset.iterate_episodes())
     seeds = [dataset.storage.get_episode_metadata([episode.id]) for episode in episodes]
@@ -60,17 +60,28 @@ def test_episodes_of_several_batches_are_those_of_one():
 
 
 def test_a_set_that_exists_is_kept(folder, capsys):
-    assert main(["datasets", "--sets", "random", "--episodes", "1"]) == 0
+    assert main(["datasets", "random", "--episodes", "1"]) == 0
     assert "springfoot/walk/random-v0" in capsys.readouterr().out
-    assert main(["datasets", "--sets", "expert", "random", "--episodes", "1"]) == 2
+    assert main(["datasets", "expert", "random", "--episodes", "1"]) == 2
     assert "springfoot/walk/random-v0 exists already" in capsys.readouterr().err
     assert list(minari.list_local_datasets()) == ["springfoot/walk/random-v0"]
     with pytest.raises(SpringfootError, match="exists already"):
-        write_sets(["random"], 1)
+        write_sets(["random"], "Walk-v0", 1)
+
+
+def test_a_policy_that_the_task_does_not_take_and_two_of_one_name_leave_nothing(folder):
+    with pytest.raises(SpringfootError, match=r"^learned was trained with acts 'both', Walk-v0 takes 'stiffness'$"):
+        write_sets(["random", "learned"], "Walk-v0", 1)
+    with pytest.raises(SpringfootError, match=r"^two policies would make the Minari set springfoot/walk/random-v0;"):
+        write_sets(["random", "random"], "Walk-v0", 1)
+    assert list(minari.list_local_datasets()) == []
+    assert set_id("runs/My run.2", "Walk-v0") == "springfoot/walk/my-run-2-v0"
+    assert set_id("a/b/mine.safetensors", "AnyBodyBoth-v0") == "springfoot/anybodyboth/mine-v0"
+    assert set_id("constant:300,40", "Walk-v0") == "springfoot/walk/constant-300-40-v0"
 
 
 def test_the_command_to_type_next_prints_the_number_of_episodes(folder, capsys):
-    assert main(["datasets", "--sets", "random", "--episodes", "2"]) == 0
+    assert main(["datasets", "random", "--episodes", "2"]) == 0
     last = capsys.readouterr().out.splitlines()[-1]
     assert last.startswith("Next:    python -c ")
     words = [sys.executable, *shlex.split(last.removeprefix("Next:"))[1:]]
@@ -83,19 +94,19 @@ def test_a_set_that_cannot_be_finished_leaves_nothing(folder, monkeypatch):
 
     monkeypatch.setattr(minari.MinariDataset, "__init__", fails)  # Minari's last step
     with pytest.raises(KeyboardInterrupt):
-        write_sets(["random"], 1)
+        write_sets(["random"], "Walk-v0", 1)
     monkeypatch.undo()
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(folder / "sets"))
     assert not list((folder / "sets").rglob("*.hdf5"))
-    assert write_sets(["random"], 1)["random"]["episodes"] == 1
+    assert write_sets(["random"], "Walk-v0", 1)["springfoot/walk/random-v0"]["episodes"] == 1
 
 
 @pytest.mark.slow
 def test_a_clone_of_the_expert_returns_as_much_in_a_fresh_process(folder):
-    assert main(["datasets", "--sets", "expert", "--episodes", "60"]) == 0  # less to learn from than by default
+    assert main(["datasets", "expert", "--episodes", "60"]) == 0  # less to learn from than by default
     words = [sys.executable, str(EXAMPLE), "--out", str(folder / "clone.safetensors")]
     subprocess.run(words, check=True, env=dict(os.environ), cwd=folder)
-    expert = load_policy("pretrained")
+    expert = load_policy("expert")
     biped = Biped(expert.settings, 20)
     own, _, _ = evaluate_returns(biped, expert, 10**6)
     cloned, _, _ = evaluate_returns(biped, load_policy(folder / "clone.safetensors"), 10**6)

@@ -1,7 +1,7 @@
-"""Write walks as Minari sets, for learners that see no environment: of an expert, of a medium policy, of random
-actions."""
+"""Write walks on a frozen task as Minari sets, for learners that see no environment: a set for each policy."""
 
 import os
+import re
 import shutil
 import warnings
 from collections.abc import Iterator, Sequence
@@ -14,25 +14,20 @@ import gymnasium as gym
 import numpy as np
 
 from springfoot import __version__
-from springfoot.agents import PolicyFunction, baseline, read_policy
+from springfoot.agents import PolicyFunction
 from springfoot.arrays import NDArray
 from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.batch.walk import walked_steps
-from springfoot.envs.settings.settings import BipedSettings, settings_to_json
+from springfoot.envs.settings.settings import BipedSettings
 from springfoot.errors import SpringfootError
 from springfoot.extras import naming_extras
 from springfoot.files.writing import is_taken, whole_folder
+from springfoot.tasks import HOW_IT_ACTS
 
-SETS = {
-    "expert": ("pretrained", "the actions of `pretrained`"),
-    "medium": ("medium", "the actions of `medium`, the same training stopped early"),
-    "random": ("random", "every action drawn from the whole range"),
-}
-"""Name of a set -> its policy, in words too."""
-NAMESPACE = "springfoot/walk"
+from .task_walks import policy_on_task
+
 DATASETS_FOLDER = "MINARI_DATASETS_PATH"
 """Variable of the folder of Minari's sets."""
-ENVIRONMENT = "springfoot/SegmentedFootBiped-v0"
 _BATCH = 50
 """Episodes side by side; chosen."""
 
@@ -46,16 +41,23 @@ class WalkedEpisode:
     observations: NDArray
     """(T + 1, D), float32."""
     actions: NDArray
-    """(T, 4), float32."""
+    """(T, A), float32."""
     rewards: NDArray
     """(T,)."""
     fell: bool
     """Whether it ended in a fall (terminated), not by its length (truncated)."""
 
 
-def set_id(name: str) -> str:
-    """Return the id under which Minari finds the set `name` of `SETS`, such as `springfoot/walk/expert-v0`."""
-    return f"{NAMESPACE}/{name}-v0"
+def set_id(policy: str, task: str) -> str:
+    """Return the id under which Minari finds the set of a policy on a task: `springfoot/walk/expert-v0` is that of
+    `expert` on Walk-v0, `springfoot/pushed/mine-v0` that of `runs/mine` or `mine.safetensors` on Pushed-v0."""
+    stem = Path(policy).stem if Path(policy).suffix == ".safetensors" else Path(policy).name
+    return f"{_namespace(task)}/{re.sub('[^a-z0-9]+', '-', stem.lower()).strip('-')}-v0"
+
+
+def _namespace(task: str) -> str:
+    """Return Minari's namespace of the sets of a task."""
+    return f"springfoot/{task.rpartition('-')[0].lower()}"
 
 
 def walked_episodes(settings: BipedSettings, policy: PolicyFunction, episodes: int, seed: int) -> list[WalkedEpisode]:
@@ -107,12 +109,12 @@ def _walk_batch(biped: Biped, policy: PolicyFunction, seeds: list[int]) -> list[
     ]
 
 
-def write_sets(names: Sequence[str], episodes: int, seed: int = 0) -> dict[str, dict[str, float]]:
-    """Write the Minari sets `names` of `SETS`, each of `episodes` episodes seeded from `seed` on.
+def write_sets(policies: Sequence[str], task: str, episodes: int, seed: int = 0) -> dict[str, dict[str, float]]:
+    """Write a Minari set for each of `policies` on a frozen task, each of `episodes` episodes seeded from `seed` on.
 
-    Returns the number of episodes, steps and falls, and the mean return, by the name of the set. All walk the task of
-    `pretrained`. Minari keeps them in the folder of its variable MINARI_DATASETS_PATH; each is written whole or not at
-    all. Raises `SpringfootError`, with nothing written, for a set that exists.
+    Returns the number of episodes, steps and falls, and the mean return, by the id of the set. Minari keeps them in the
+    folder of its variable MINARI_DATASETS_PATH; each is written whole or not at all. Raises `SpringfootError`, with
+    nothing written, for a set that exists, two of one id, and policies that the task does not take.
     """
     with naming_extras():
         import h5py  # noqa: F401  # not above: extras
@@ -120,18 +122,18 @@ def write_sets(names: Sequence[str], episodes: int, seed: int = 0) -> dict[str, 
         from minari import namespace
         from minari.data_collector import EpisodeBuffer
         from minari.storage.datasets_root_dir import get_dataset_path
-    settings = read_policy("pretrained").settings
-    for name in names:
-        if is_taken(get_dataset_path(set_id(name))):
-            raise SpringfootError(f"the Minari set {set_id(name)} exists already; minari delete {set_id(name)}")
-    if NAMESPACE not in namespace.list_local_namespaces():
-        namespace.create_namespace(NAMESPACE)
+    walkers = [policy_on_task(policy, task) for policy in policies]
+    ids = [set_id(policy, task) for policy in policies]
+    for own in ids:
+        if ids.count(own) > 1:
+            raise SpringfootError(f"two policies would make the Minari set {own}; rename one")
+        if is_taken(get_dataset_path(own)):
+            raise SpringfootError(f"the Minari set {own} exists already; minari delete {own}")
+    if _namespace(task) not in namespace.list_local_namespaces():
+        namespace.create_namespace(_namespace(task))
     results = {}
-    environment = gym.make(ENVIRONMENT, **settings_to_json(settings))
-    for name in names:
-        policy_name, description = SETS[name]
-        policy = baseline(policy_name, settings, seed) if policy_name == "random" else read_policy(policy_name)
-        walked = walked_episodes(settings, policy, episodes, seed)
+    for policy, own, (act, settings) in zip(policies, ids, walkers, strict=True):
+        walked = walked_episodes(settings, act, episodes, seed)
         buffers = [
             EpisodeBuffer(
                 id=index,
@@ -144,30 +146,31 @@ def write_sets(names: Sequence[str], episodes: int, seed: int = 0) -> dict[str, 
             )
             for index, walk in enumerate(walked)
         ]
-        out = get_dataset_path(set_id(name))
+        environment = gym.make(f"springfoot/{task}", **{name: getattr(settings, name) for name in HOW_IT_ACTS})
+        out = get_dataset_path(own)
         with whole_folder(out, out) as (part, _), _datasets_in(part), warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # that an address is missing, and an evaluation's environment
             minari.create_dataset_from_buffers(
-                set_id(name),
+                own,
                 buffers,
                 env=environment.spec,
                 observation_space=environment.observation_space,
                 action_space=environment.action_space,
-                algorithm_name=description,
+                algorithm_name=policy,
                 author="springfoot contributors",
-                description=f"{episodes} episodes from seed {seed} on: {description}.",
+                description=f"{episodes} episodes of {policy} on {task}, from seed {seed} on.",
                 requirements=[f"springfoot=={__version__}"],
             )
             # Minari writes below the set's id: its data move up, and the emptied folders go.
-            (part / set_id(name) / "data").rename(part / "data")
-            shutil.rmtree(part / NAMESPACE.split("/")[0])
-        results[name] = {
+            (part / own / "data").rename(part / "data")
+            shutil.rmtree(part / "springfoot")
+        environment.close()
+        results[own] = {
             "episodes": episodes,
             "steps": sum(len(walk.rewards) for walk in walked),
             "return_mean": float(np.mean([walk.rewards.sum() for walk in walked])),
             "falls": sum(walk.fell for walk in walked),
         }
-    environment.close()
     return results
 
 
