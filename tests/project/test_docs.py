@@ -13,6 +13,7 @@ import pytest
 import tyro
 
 from springfoot.cli.completion import Shell
+from springfoot.cli.datasets import DatasetsFlags
 from springfoot.cli.evaluate import EvaluateFlags
 from springfoot.cli.examples import ExamplesFlags
 from springfoot.cli.export import ExportFlags
@@ -165,7 +166,13 @@ def test_every_command_that_a_document_names_is_understood(command):
         assert not words or words[0] in get_args(Shell)
     elif program[0] == "springfoot" and program[1] != "study" and words:
         flags = {"train": TrainFlags, "evaluate": EvaluateFlags, "export": ExportFlags, "live": LiveFlags}
-        flags |= {"examples": ExamplesFlags, "feet": FootChoice, "person": Person, "score": Score}
+        flags |= {
+            "datasets": DatasetsFlags,
+            "examples": ExamplesFlags,
+            "feet": FootChoice,
+            "person": Person,
+            "score": Score,
+        }
         tyro.cli(flags[program[1]], args=words)
     else:
         assert program[0] != "springfoot" or words in ([], ["--help"], ["--all"], ["NAME"])
