@@ -83,7 +83,7 @@ class _BothImages(MlpExtractor):
             )
         else:
             actor, critic = self.policy_net(images), self.value_net(images)
-        return actor, critic.sum(-2)
+        return actor, torch.add(*critic.unbind(-2))  # several times as fast as a sum over an axis of two
 
     def forward_actor(self, features: torch.Tensor) -> torch.Tensor:
         """Return the actor's last hidden layer, of H units, for observations (N, D) and their images: (N, 2, H)."""
@@ -91,11 +91,11 @@ class _BothImages(MlpExtractor):
 
     def forward_critic(self, features: torch.Tensor) -> torch.Tensor:
         """Return the critic's last hidden layer (N, H), of H units: the sum for observations (N, D) and images."""
-        return self.value_net(self._with_images(features)).sum(-2)
+        return torch.add(*self.value_net(self._with_images(features)).unbind(-2))
 
     def _with_images(self, features: torch.Tensor) -> torch.Tensor:
         """Return normalised observations (N, D) with their mirror images, (N, 2, D): the image has index 1."""
-        return torch.stack((features, features[..., self._index] * self._sign), -2)
+        return torch.stack((features, features.index_select(-1, self._index) * self._sign), -2)
 
 
 class _SideBySide(torch.autograd.Function):
