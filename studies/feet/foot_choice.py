@@ -37,7 +37,7 @@ from ..base.flags import read_foot_flag
 from ..base.study import QUICK_NOTE, Answer, OnProgress, WalkingStudy
 from .foot_numbers import numbers_of_feet
 from .orthosis import braced_calf
-from .told_apart import GAP, common_speed, comparison, difference, price_at, verdict
+from .told_apart import common_speed, comparison, difference, gap_of, price_at, verdict
 from .walked_speeds import TWO_PRICES, Row, rows_csv
 
 MOST_FEET = 8
@@ -189,6 +189,11 @@ class FootChoice(WalkingStudy):
         return named_feet(self.foot)
 
     @property
+    def gap(self) -> float:
+        """Return the least difference between the feet that is told apart."""
+        return gap_of(settings_from(left_foot=foot).left_foot for foot in self.feet.values())
+
+    @property
     def total(self) -> float:
         """Return the simulated time of all walks if none falls [s]."""
         return 3 * len(self.persons) * len(self.feet) * self.episodes * self.seconds
@@ -314,7 +319,7 @@ class FootChoice(WalkingStudy):
         ]
         answer = f"**{where}**"
         if first:
-            fibre_work, effort = (verdict(words, priced[price]) for price, words in PRICE_NAMES.items())
+            fibre_work, effort = (verdict(words, priced[price], self.gap) for price, words in PRICE_NAMES.items())
             answer = f"**{where} {fibre_work}** {effort} {WHICH_PRICE}"
         return f"{answer}\n\n{table(head, lines)}"
 
@@ -332,8 +337,9 @@ class FootChoice(WalkingStudy):
             f"Changes are against {first}{', with 95 % intervals over persons' if several else ''}. "
         )
         apart = (
-            f"Feet are told apart by {100 * GAP:g} % or more, an interval without 0 and one sign of all persons; alike "
-            f"are those whose interval lies within {100 * GAP:g} %, the others uncertain."
+            f"Feet are told apart by {100 * self.gap:g} % or more, an interval without 0 and one sign of all persons; "
+            f"alike are those whose interval lies within {100 * self.gap:g} %, the others uncertain. A person trained "
+            "on with one of them alone may take less by so much."
             if several
             else "One person has no interval, so that no feet are told apart."
         )

@@ -35,6 +35,7 @@ class Orthosis(SpringMap):
     SPRINGS: ClassVar[Sequence[float]] = (0.0, 0.9, 1.8, 2.7, 3.6, 4.9, 6.2, 7.4, 8.7)
     """[N m/deg]; Waterval et al. (2019) tried 0.9 to 8.7."""
     UNIT: ClassVar[str] = "N·m/deg"
+    KINDS: ClassVar[Sequence[str]] = ("weak", "intact")
 
     def settings_of(self, case: float) -> Mapping[str, Any]:
         """Return no settings: the body is the usual one."""

@@ -21,6 +21,7 @@ class Prosthesis(SpringMap):
     CASES: ClassVar[Sequence[float]] = (50.0, 63.0, 80.0)
     SPRINGS: ClassVar[Sequence[float]] = (150.0, 250.0, 400.0, 600.0, 1000.0, 1500.0)
     """[N m/rad]."""
+    KINDS: ClassVar[Sequence[str]] = ("passive",)
 
     def settings_of(self, case: float) -> Mapping[str, Any]:
         """Return the setting `mass` with the value `case` [kg]."""

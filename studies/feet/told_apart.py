@@ -1,25 +1,29 @@
 """Tell which of several feet takes least at one walked speed, which are told apart from it, and which are alike.
 
 Every person walks the same episodes on every foot, so that feet are compared in pairs of episodes. Two feet are told
-apart if they differ by `GAP` or more, the 95 % interval of the difference leaves 0 out, and every person has its sign.
-They are alike if the interval lies within `GAP`, else uncertain. The interval is over persons, as one person's episodes
-are alike and say nothing of how others learn: of one person nothing is told apart, and nothing is alike.
-A slower walk has another price: so prices are taken at one speed that all walk, between two walks at two commanded
-speeds, never beyond them.
+apart if they differ by the gap of their kinds (`gap_of`) or more, the 95 % interval of the difference leaves 0 out, and
+every person has its sign. They are alike if the interval lies within that gap, else uncertain. The interval is over
+persons, as one person's episodes are alike and say nothing of how others learn: of one person nothing is told apart,
+and nothing is alike. A slower walk has another price: so prices are taken at one speed that all walk, between two walks
+at two commanded speeds, never beyond them.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from springfoot.arrays import NDArray
+from springfoot.envs.settings import FootSetting
 
 from ..base.intervals import interval_of_persons
 
 GAP = 0.05
-"""Least difference that is told apart: in a trial a network trained on one foot alone walked up to 5 % cheaper
-on it than one trained on all feet."""
+"""Least difference of sound, braced and rigid feet that is told apart: a network trained on with one of them alone
+walks within 4 % of one trained on all feet (docs/results/csv/specialists.csv, rounded up)."""
+GAPS = {"weak": 0.22, **dict.fromkeys(("passive", "adaptive", "drop", "rigid_toe", "no_toe"), 0.11)}
+"""The same of other kinds, as a person has adapted less to them: on a passive foot a network trained on with it alone
+takes 11 % less, with calves of 25 % 22 % (the same file). Kinds that were not measured count as passive ones."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,14 +37,16 @@ class Difference:
     """High end of the 95 % interval."""
     persons: int
     """Number of persons."""
+    gap: float = GAP
+    """Least difference that is told apart."""
     told_apart: bool
-    """True if the mean is `GAP` or more, the interval leaves 0 out, and every person's mean has its sign; False of one
+    """True if the mean is `gap` or more, the interval leaves 0 out, and every person's mean has its sign; False of one
     person."""
 
     @property
     def alike(self) -> bool:
-        """Return True if the interval lies within `GAP` either way; False of one person."""
-        return self.persons > 1 and self.low > -GAP and self.high < GAP
+        """Return True if the interval lies within `gap` either way; False of one person."""
+        return self.persons > 1 and self.low > -self.gap and self.high < self.gap
 
     @property
     def text(self) -> str:
@@ -57,9 +63,20 @@ class Difference:
         return f"{_percent(self.mean, digits)} %{interval}"
 
 
-def difference(prices: NDArray, others: NDArray) -> Difference:
+def gap_of(feet: Iterable[FootSetting]) -> float:
+    """Return the largest gap of the kinds of `feet`: the least difference between them that is told apart."""
+    return max(GAPS.get(foot.kind, GAP) for foot in feet)
+
+
+def gap_words(*kinds: str) -> str:
+    """Return a sentence on the least differences that tell feet of these kinds apart."""
+    shares = [f"{100 * GAPS.get(kind, GAP):g} % ({kind})" for kind in kinds]
+    return f"A person trained on with one foot alone may take less, by up to {_list(shares)}: no less tells feet apart."
+
+
+def difference(prices: NDArray, others: NDArray, gap: float = GAP) -> Difference:
     """Return the difference of a foot's `prices` from another foot's prices `others`, both (P, E), of the same P
-    persons in the same E episodes.
+    persons in the same E episodes; less than `gap` is not told apart.
 
     The interval is that of `interval_of_persons`.
     """
@@ -69,8 +86,8 @@ def difference(prices: NDArray, others: NDArray) -> Difference:
     mean = float(of_persons.mean())
     signs = np.sign(of_persons)
     leaves_0_out = len(prices) > 1 and (low > 0.0 or high < 0.0)
-    apart = abs(mean) >= GAP and leaves_0_out and bool((signs == signs[0]).all())
-    return Difference(mean=mean, low=low, high=high, persons=len(prices), told_apart=apart)
+    apart = abs(mean) >= gap and leaves_0_out and bool((signs == signs[0]).all())
+    return Difference(mean=mean, low=low, high=high, persons=len(prices), gap=gap, told_apart=apart)
 
 
 LEAST_CHANGE = 0.02
@@ -161,7 +178,7 @@ def comparison(
     return f"Compared at {speed:.2f} m/s walked{why}.{without}"
 
 
-def verdict(price: str, prices: Mapping[str, NDArray]) -> str:
+def verdict(price: str, prices: Mapping[str, NDArray], gap: float = GAP) -> str:
     """Return sentences on the foot of least price, those alike, the saving against the first, and the other feet.
 
     Feet that are neither alike nor told apart are uncertain, and have their interval. Of one person all changes are
@@ -170,20 +187,21 @@ def verdict(price: str, prices: Mapping[str, NDArray]) -> str:
     Args:
         price: name of the price, such as "fibre work".
         prices: name of a foot -> prices (P, E) of P persons in E episodes; one foot at least.
+        gap: least difference that is told apart.
     """
     first = next(iter(prices))
     least = min(prices, key=lambda name: prices[name].mean())
     if len(prices) == 1:
         return f"{price.capitalize()} is known with {least} alone."
-    changes = {name: difference(values, prices[least]) for name, values in prices.items() if name != least}
+    changes = {name: difference(values, prices[least], gap) for name, values in prices.items() if name != least}
     sentence = f"{price.capitalize()} is least with {least}"
     if len(prices[least]) == 1:
         return f"{sentence}, of one person: no interval.{_against(least, changes)}"
     if alike := [name for name, change in changes.items() if change.alike]:
-        sentence += f", alike (within {100 * GAP:g} %) with {_list(alike)}"
+        sentence += f", alike (within {100 * gap:g} %) with {_list(alike)}"
     dearer = {name: change for name, change in changes.items() if change.told_apart}
     if dearer.pop(first, None):
-        sentence += f": {difference(prices[least], prices[first]).text} against {first}"
+        sentence += f": {difference(prices[least], prices[first], gap).text} against {first}"
     uncertain = [
         f"{name}, {change.to_digits(1)}" for name, change in changes.items() if not (change.alike or change.told_apart)
     ]

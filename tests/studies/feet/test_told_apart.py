@@ -1,19 +1,29 @@
 """Feet told apart, alike or uncertain: planted prices, persons that disagree, prices at one speed that all walk."""
 
+import csv
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from springfoot.envs.settings import settings_from
+from springfoot.studies.feet.specialists import CELLS
 from springfoot.studies.feet.told_apart import (
     GAP,
+    GAPS,
     LEAST_CHANGE,
     common_speed,
     comparison,
     difference,
+    gap_of,
+    gap_words,
     price_at,
     verdict,
     without_price,
 )
+from springfoot.studies.feet.walked_speeds import TWO_PRICES
 
+CSV = Path(__file__).parents[3] / "docs" / "results" / "csv" / "specialists.csv"
 NOISE = 0.01 * np.random.default_rng(0).standard_normal((3, 8))
 """Of three persons in eight episodes."""
 
@@ -38,6 +48,32 @@ def test_what_is_not_told_apart(factors):
 def test_a_foot_is_not_told_apart_from_itself_in_other_episodes():
     prices = 3.0 * (1 + 10 * NOISE)
     assert not difference(prices, prices[:, ::-1]).told_apart
+
+
+def test_gaps_are_no_smaller_than_those_that_specialists_have():
+    with CSV.open(encoding="utf-8", newline="") as lines:
+        rows = {row["cell"]: [abs(float(row[f"{price}_gap"])) for price in TWO_PRICES] for row in csv.DictReader(lines)}
+    assert rows.keys() == CELLS.keys()
+    weak, passive = (max(rows.pop(cell)) for cell in ("both calves of 25 %", "passive right foot, 300 N·m/rad"))
+    for found, gap in ((weak, GAPS["weak"]), (passive, GAPS["passive"]), (max(map(max, rows.values())), GAP)):
+        assert 0.6 * gap < found <= gap
+    assert gap_of([settings_from(left_foot=foot).left_foot for foot in ("intact", "rigid")]) == GAP
+    assert (
+        gap_of([settings_from(left_foot=foot).left_foot for foot in ("intact", {"kind": "weak", "strength": 0.3})])
+        == GAPS["weak"]
+    )
+    assert gap_words("weak", "intact") == (
+        "A person trained on with one foot alone may take less, by up to 22 % (weak) and 5 % (intact): "
+        "no less tells feet apart."
+    )
+
+
+def test_a_larger_gap_tells_fewer_feet_apart():
+    prices = 3.0 * (1 + NOISE)
+    assert difference(0.9 * prices, prices, 0.09).told_apart and not difference(0.9 * prices, prices, 0.09).alike
+    assert difference(0.9 * prices, prices, 0.11).alike and not difference(0.9 * prices, prices, 0.11).told_apart
+    words = verdict("effort", {"none": FIRST, "4": 0.9 * FIRST}, 0.2)
+    assert words == "Effort is least with 4, alike (within 20 %) with none."
 
 
 FIRST = np.full((3, 5), 4.0)
