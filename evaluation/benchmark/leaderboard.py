@@ -12,7 +12,7 @@ from springfoot.files.markdown import MISSING, table
 from springfoot.tasks import STIFFNESS_TASKS, TASKS, VERSION
 
 from .judged import JudgedRow, judged_rows
-from .learner_scores import LearnerScores, interval, interval_text, learner_scores
+from .learner_scores import SCHEDULE, LearnerScores, interval, interval_text, learner_scores
 from .task_walks import EPISODES
 
 MOST_ROWS = 8
@@ -53,7 +53,8 @@ def _cells(name: str, rows: Sequence[JudgedRow]) -> list[str]:
 
 def _scores_section(scores: LearnerScores) -> str:
     """Return the Markdown section of the learners' scores: a row for each task that sets stiffness; empty without."""
-    if not scores:
+    learners = {name: by_task for name, by_task in scores.items() if name != SCHEDULE}
+    if not learners:
         return ""
     tasks = [f"{name}-{VERSION}" for name in STIFFNESS_TASKS]
     lines = []
@@ -62,8 +63,8 @@ def _scores_section(scores: LearnerScores) -> str:
         lines.append([task, *("not run" if each is None else interval_text([each], ".2f") for each in own)])
     whole = [[by_task[task] for task in tasks] if {*tasks} <= by_task.keys() else None for by_task in scores.values()]
     lines.append(["all", *(MISSING if each is None else interval_text(each, ".2f") for each in whole)])
-    run = [task for task in tasks if any(task in own for own in scores.values())]
-    above = [task for task in run if any(task in own and interval([own[task]])[1] > 1.0 for own in scores.values())]
+    run = [task for task in tasks if any(task in own for own in learners.values())]
+    above = [task for task in run if any(task in own and interval([own[task]])[1] > 1.0 for own in learners.values())]
     words = [f"Better than the best constant springs, with all of an interval: {', '.join(above) or 'nowhere'}."]
     if below := [task for task in run if task not in above]:
         words.append(f"Not better: {', '.join(below)}.")

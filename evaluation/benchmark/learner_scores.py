@@ -17,6 +17,8 @@ _RESAMPLES = 2000
 """Resamples of the bootstrap, as in the paper's library, rliable."""
 RANDOM, CONSTANT = "random", "constant"
 """Baselines at scores 0 and 1."""
+SCHEDULE = "schedule"
+"""Baseline that has a score as a learner has."""
 
 LearnerScores = Mapping[str, Mapping[str, NDArray]]
 """Learner -> task -> (S,) score of each training [-]."""
@@ -33,17 +35,19 @@ def baseline_returns(rows: Sequence[JudgedRow]) -> dict[tuple[str, str], float]:
 
 
 def learner_scores(rows: Sequence[JudgedRow]) -> LearnerScores:
-    """Return the scores of the entries with several trainings, on the tasks that have both baselines."""
+    """Return the scores of `SCHEDULE` and of the entries with several trainings, on the tasks that have both
+    baselines."""
     ends = baseline_returns(rows)
     returns: dict[str, dict[str, list[float]]] = {}
     for row in rows:
-        returns.setdefault(row.entry, {}).setdefault(row.submission.task, []).append(row.return_mean)
+        entry = SCHEDULE if row.submission.policy == SCHEDULE else row.entry
+        returns.setdefault(entry, {}).setdefault(row.submission.task, []).append(row.return_mean)
     scores = {}
     for learner, by_task in returns.items():
         own = {
             task: (np.array(values) - ends[RANDOM, task]) / (ends[CONSTANT, task] - ends[RANDOM, task])
             for task, values in by_task.items()
-            if len(values) > 1 and {(RANDOM, task), (CONSTANT, task)} <= ends.keys()
+            if (len(values) > 1 or learner == SCHEDULE) and {(RANDOM, task), (CONSTANT, task)} <= ends.keys()
         }
         if own:
             scores[learner] = own
@@ -68,9 +72,10 @@ def interval(samples: Sequence[NDArray]) -> tuple[float, float, float]:
 
 
 def interval_text(samples: Sequence[NDArray], pattern: str) -> str:
-    """Return `interval` as text, "middle (low to high)", in the format `pattern`; of a single value the value."""
+    """Return `interval` as text, "middle (low to high)", in the format `pattern`; of single values the middle
+    alone."""
     middle, *ends = interval(samples)
-    if sum(map(len, samples)) < 2:
+    if all(len(sample) < 2 for sample in samples):
         return format(middle, pattern)
     return f"{middle:{pattern}} ({' to '.join(format(end, pattern) for end in ends)})"
 

@@ -3,12 +3,12 @@
     springfoot study when learned learned-2 learned-3 --keep runs/when
 
 Four classes of stiffness, each within the next (`stiffness_classes`): constant, by phase, open loop, linear reflex. At
-each link the inner and the outer class go on with the same number of walks, by CMA-ES, from the best stiffness found for
-the inner one; so does the constant class, whose find the inner one, after it, already knows. In the end each class takes, of all that any search found in it or in a class within it, the
-stiffness that costs least on walks that no search had. All four walk a test from further starts, and are compared
-episode by episode, neighbours and each with the constant class. There are two aims, each with its own searches: least
-fibre work a metre, and least distance from people. At last the reflex walks the same test with errors that reach it
-late.
+each link the inner and the outer class go on with the same number of walks, by CMA-ES, from the best stiffness found
+for the inner one; so does the constant class, whose find the inner one, after it, already knows. In the end each class
+takes, of all that any search found in it or in a class within it, the stiffness that costs least on walks that no
+search had. All four walk a test from further starts, and are compared episode by episode, neighbours and each with the
+constant class. There are two aims, each with its own searches: least fibre work a metre, and least distance from
+people. At last the reflex walks the same test with errors that reach it late.
 """
 
 from collections.abc import Mapping, Sequence

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from springfoot.evaluation.benchmark.judged import JudgedRow
-from springfoot.evaluation.benchmark.learner_scores import interval, interval_text, learner_scores, profile
+from springfoot.evaluation.benchmark.learner_scores import SCHEDULE, interval, interval_text, learner_scores, profile
 from springfoot.evaluation.benchmark.submission import Submission
 from springfoot.evaluation.benchmark.task_walks import EPISODES, TaskWalks
 from springfoot.tasks import STIFFNESS_TASKS, VERSION
@@ -45,6 +45,11 @@ def test_one_training_has_no_spread_and_a_task_without_baselines_no_score():
     assert learner_scores([*ENDS, *trainings("once", WALK, 400.0), *trainings("ours", PUSHED, 1.0, 2.0)]) == {}
 
 
+def test_the_schedule_has_a_score_whatever_it_is_called():
+    scores = learner_scores([*ENDS, row("the thesis's", WALK, "schedule", 250.0)])
+    assert {name: by_task[WALK].tolist() for name, by_task in scores.items()} == {SCHEDULE: [0.75]}
+
+
 def test_the_outer_quarters_do_not_count():
     middle, low, high = interval([np.array([-1000.0, 1.0, 2.0, 3.0, 1000.0])])
     assert middle == 2.0
@@ -59,6 +64,7 @@ def test_trainings_are_drawn_anew_within_their_task():
 @pytest.mark.parametrize(("values", "text"), [([2.5], "2.5"), ([2.0, 2.0], "2.0 (2.0 to 2.0)")])
 def test_a_single_training_is_told_without_an_interval(values, text):
     assert interval_text([np.array(values)], ".1f") == text
+    assert interval_text([np.array(values)] * 2, ".1f") == text
 
 
 def test_a_profile_is_the_fraction_of_trainings_above_with_each_task_alike():
