@@ -27,7 +27,7 @@ from ..base.condition_walks import ConditionWalks
 from ..base.kept import Kept
 from ..base.study import Answer, OnProgress, WalkingStudy
 from .both_feet import both, braced
-from .told_apart import gap_words
+from .told_apart import gain_words
 from .walked_speeds import TWO_PRICES, Row, at_walked_speeds, lowest, price_numbers, rows_csv
 
 ASKED_SPEEDS = (0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6)
@@ -142,7 +142,7 @@ class Controls(WalkingStudy):
         files = {"walks.csv": rows_csv(walks), "equal_speeds.csv": rows_csv(even), "best_springs.csv": rows_csv(best)}
         how = (
             f"{self.what_ran} of each condition and commanded speed; policies {', '.join(self.policies)}. "
-            f"{gap_words('intact')}"
+            f"{gain_words('intact', 'passive', 'weak')}"
         )
         return Answer(text=f"{controls_table(even)}\n\n{best_table(best)}\n\n{how}", files=files)
 

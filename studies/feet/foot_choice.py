@@ -37,7 +37,7 @@ from ..base.flags import read_foot_flag
 from ..base.study import QUICK_NOTE, Answer, OnProgress, WalkingStudy
 from .foot_numbers import numbers_of_feet
 from .orthosis import braced_calf
-from .told_apart import common_speed, comparison, difference, gap_of, price_at, verdict
+from .told_apart import MOST_ALIKE, common_speed, comparison, difference, gain_of, gain_words, price_at, verdict
 from .walked_speeds import TWO_PRICES, Row, rows_csv
 
 MOST_FEET = 8
@@ -57,7 +57,8 @@ CANNOT_SAY = """What this cannot say:
 
 - It is a body in a plane: nothing here is about comfort, pain, or balance to the side.
 - The person has adapted to all feet at once; one who wears a single foot for weeks may walk cheaper on it.
-- Read differences, not the price itself. A missing ankle comes out cheaper here than a sound one; people pay more."""
+- Read differences, not the price itself. A missing ankle may come out cheaper here than a sound one; people
+  pay as much or more."""
 """Limits of the model."""
 
 
@@ -189,9 +190,14 @@ class FootChoice(WalkingStudy):
         return named_feet(self.foot)
 
     @property
-    def gap(self) -> float:
-        """Return the least difference between the feet that is told apart."""
-        return gap_of(settings_from(left_foot=foot).left_foot for foot in self.feet.values())
+    def _worn(self) -> Mapping[str, FootSetting]:
+        """Return name -> foot."""
+        return {name: settings_from(left_foot=foot).left_foot for name, foot in self.feet.items()}
+
+    @property
+    def _gains(self) -> Mapping[str, float]:
+        """Return name -> the share of its price that a person may gain by further training on the foot alone."""
+        return {name: gain_of(foot) for name, foot in self._worn.items()}
 
     @property
     def total(self) -> float:
@@ -285,7 +291,7 @@ class FootChoice(WalkingStudy):
         if not self.spring:
             return foot_words
         beside = "" if self.calf is None else f" beside a calf of {self.calf:.0%}"
-        springs = {str(settings_from(left_foot=foot).left_foot): name + beside for name, foot in self.feet.items()}
+        springs = {str(foot): name + beside for name, foot in self._worn.items()}
         return lambda foot: springs.get(str(foot)) or foot_words(foot)
 
     def _answer(
@@ -319,7 +325,7 @@ class FootChoice(WalkingStudy):
         ]
         answer = f"**{where}**"
         if first:
-            fibre_work, effort = (verdict(words, priced[price], self.gap) for price, words in PRICE_NAMES.items())
+            fibre_work, effort = (verdict(words, priced[price], self._gains) for price, words in PRICE_NAMES.items())
             answer = f"**{where} {fibre_work}** {effort} {WHICH_PRICE}"
         return f"{answer}\n\n{table(head, lines)}"
 
@@ -337,9 +343,9 @@ class FootChoice(WalkingStudy):
             f"Changes are against {first}{', with 95 % intervals over persons' if several else ''}. "
         )
         apart = (
-            f"Feet are told apart by {100 * self.gap:g} % or more, an interval without 0 and one sign of all persons; "
-            f"alike are those whose interval lies within {100 * self.gap:g} %, the others uncertain. A person trained "
-            "on with one of them alone may take less by so much."
+            f"{gain_words(*dict.fromkeys(foot.kind for foot in self._worn.values()))} Told apart are such feet with an "
+            f"interval without 0 and one sign of all persons; alike are those whose interval lies within "
+            f"{100 * MOST_ALIKE:g} %, the others uncertain."
             if several
             else "One person has no interval, so that no feet are told apart."
         )

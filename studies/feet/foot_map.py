@@ -29,7 +29,7 @@ from springfoot.files.markdown import MISSING, table, text_of
 from ..base.adapting_persons import person_and_settings
 from ..base.study import Answer, OnProgress, WalkingStudy
 from .foot_numbers import numbers_of_feet
-from .told_apart import gap_words
+from .told_apart import gain_words
 from .walked_speeds import Row, rows_csv
 
 RightFoot = str | dict[str, Any]
@@ -103,7 +103,7 @@ class FootMap(WalkingStudy):
         """Walk every person on every foot of the map, and with ankles of one stiffness."""
         rows = [row for person in self.persons for row in self._foot_rows(person, progress)]
         flat = [row for person in self.persons for row in self._flat_rows(person, progress)]
-        how = f"{self.what_ran} of each, commanded {self.speed:g} m/s. {gap_words('intact', 'passive', 'weak')}"
+        how = f"{self.what_ran} of each, commanded {self.speed:g} m/s. {gain_words('intact', 'passive', 'weak')}"
         text = f"{map_table(rows)}\n\n{flat_table(flat)}\n\n{how}"
         return Answer(text=text, files={"feet.csv": rows_csv(rows), "flat.csv": rows_csv(flat)})
 

@@ -15,7 +15,7 @@ from typing import Annotated, Any, ClassVar
 import tyro
 
 from springfoot.agents.training import PRESETS, TrainingConfig, read_record
-from springfoot.errors import require_count
+from springfoot.errors import SpringfootError, require_count
 from springfoot.evaluation.numbers import measure
 from springfoot.evaluation.recording import record
 from springfoot.files.markdown import MISSING, table, text_of
@@ -69,6 +69,8 @@ class Specialists(WalkingStudy):
         super().check()
         require_count("timesteps", self.timesteps)
         require_count("training_seed", self.training_seed, 0, 2**31 - 1)
+        if repeated := [name for name in self.persons if self.persons.count(name) > 1]:
+            raise SpringfootError(f"{repeated[0]} is given {len(repeated)} times; give each person once")
 
     @property
     def total(self) -> float:

@@ -23,7 +23,7 @@ from springfoot.files.markdown import MISSING, table
 from ..base.kept import Kept, known_as
 from ..base.study import Answer, OnProgress, PersonsStudy
 from .foot_numbers import FOOT_NUMBERS, numbers_of_feet
-from .told_apart import gap_words
+from .told_apart import gain_words
 from .walked_speeds import ASKED_SPEEDS, TWO_PRICES, WALKED_SPEEDS, Row, at_walked_speeds, lowest, rows_csv
 
 COLORS = ("#0b6e8f", "#c26a1b", "#7a5195", "#4a8f3c", "#555555")
@@ -138,7 +138,7 @@ class SpringMap(PersonsStudy):
         parts.append(
             f"Somebody falls in {fallen} of {len(walks)} walks. {self.what_ran} of each of {springs}, of each case and "
             f"of each commanded speed. Best: least fibre work for a metre where all walk equally fast, by the parabola "
-            f"through the cheapest spring and its neighbours. {gap_words(*self.KINDS)}"
+            f"through the cheapest spring and its neighbours. {gain_words(*self.KINDS)}"
         )
         return "\n\n".join(parts)
 

@@ -1,14 +1,14 @@
 """Tell which of several feet takes least at one walked speed, which are told apart from it, and which are alike.
 
 Every person walks the same episodes on every foot, so that feet are compared in pairs of episodes. Two feet are told
-apart if they differ by the gap of their kinds (`gap_of`) or more, the 95 % interval of the difference leaves 0 out, and
-every person has its sign. They are alike if the interval lies within that gap, else uncertain. The interval is over
-persons, as one person's episodes are alike and say nothing of how others learn: of one person nothing is told apart,
-and nothing is alike. A slower walk has another price: so prices are taken at one speed that all walk, between two walks
-at two commanded speeds, never beyond them.
+apart if further training on the dearer one alone would not make it the cheaper one (`gain_of`), the 95 % interval of
+the difference leaves 0 out, and every person has its sign. They are alike if the interval lies within `MOST_ALIKE`,
+else uncertain. The interval is over persons, as one person's episodes are alike and say nothing of how others learn: of
+one person nothing is told apart, and nothing is alike. A slower walk has another price: so prices are taken at one
+speed that all walk, between two walks at two commanded speeds, never beyond them.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,12 +18,14 @@ from springfoot.envs.settings import FootSetting
 
 from ..base.intervals import interval_of_persons
 
-GAP = 0.05
-"""Least difference of sound, braced and rigid feet that is told apart: a network trained on with one of them alone
-walks within 4 % of one trained on all feet (docs/results/csv/specialists.csv, rounded up)."""
-GAPS = {"weak": 0.22, **dict.fromkeys(("passive", "adaptive", "drop", "rigid_toe", "no_toe"), 0.11)}
-"""The same of other kinds, as a person has adapted less to them: on a passive foot a network trained on with it alone
-takes 11 % less, with calves of 25 % 22 % (the same file). Kinds that were not measured count as passive ones."""
+GAIN = 0.05
+"""Share of its price that a person may gain by further training on one sound, braced or rigid foot alone: `learned`
+gained up to 3.4 % (docs/results/csv/specialists.csv, rounded up; one training of one person)."""
+GAIN_OF_KIND = {"weak": 0.22, **dict.fromkeys(("passive", "adaptive", "drop", "rigid_toe", "no_toe"), 0.11)}
+"""The same of other kinds: 22 % with calves of 25 %, 11 % on a passive foot of 300 N m/rad (the same file). Kinds that
+were not measured are taken to be as passive ones."""
+MOST_ALIKE = 0.05
+"""Largest difference of feet that are alike; chosen."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,16 +39,14 @@ class Difference:
     """High end of the 95 % interval."""
     persons: int
     """Number of persons."""
-    gap: float = GAP
-    """Least difference that is told apart."""
     told_apart: bool
-    """True if the mean is `gap` or more, the interval leaves 0 out, and every person's mean has its sign; False of one
-    person."""
+    """True if the dearer foot is so after its gain, the interval leaves 0 out, and every person's mean has its sign;
+    False of one person."""
 
     @property
     def alike(self) -> bool:
-        """Return True if the interval lies within `gap` either way; False of one person."""
-        return self.persons > 1 and self.low > -self.gap and self.high < self.gap
+        """Return True if the interval lies within `MOST_ALIKE` either way; False of one person."""
+        return self.persons > 1 and self.low > -MOST_ALIKE and self.high < MOST_ALIKE
 
     @property
     def text(self) -> str:
@@ -63,22 +63,32 @@ class Difference:
         return f"{_percent(self.mean, digits)} %{interval}"
 
 
-def gap_of(feet: Iterable[FootSetting]) -> float:
-    """Return the largest gap of the kinds of `feet`: the least difference between them that is told apart."""
-    return max(GAPS.get(foot.kind, GAP) for foot in feet)
+def gain_of(foot: FootSetting) -> float:
+    """Return the share of its price that a person may gain by further training on this foot alone."""
+    return GAIN_OF_KIND.get(foot.kind, GAIN)
 
 
-def gap_words(*kinds: str) -> str:
-    """Return a sentence on the least differences that tell feet of these kinds apart."""
-    shares = [f"{100 * GAPS.get(kind, GAP):g} % ({kind})" for kind in kinds]
-    return f"A person trained on with one foot alone may take less, by up to {_list(shares)}: no less tells feet apart."
+def least_told_apart(gain: float) -> float:
+    """Return the least difference, as a share of the cheaper foot's price, at which a foot with this `gain` is dearer
+    after it."""
+    return 1.0 / (1.0 - gain) - 1.0
 
 
-def difference(prices: NDArray, others: NDArray, gap: float = GAP) -> Difference:
+def gain_words(*kinds: str) -> str:
+    """Return a sentence on the least differences that tell feet of these kinds from cheaper ones."""
+    shares = [f"{100 * least_told_apart(GAIN_OF_KIND.get(kind, GAIN)):.0f} % ({kind})" for kind in kinds]
+    return (
+        "A person trained on with one foot alone may take less: a foot is told from a cheaper one where it takes more "
+        f"by {_list(shares)}."
+    )
+
+
+def difference(prices: NDArray, others: NDArray, gain: float = GAIN, others_gain: float = GAIN) -> Difference:
     """Return the difference of a foot's `prices` from another foot's prices `others`, both (P, E), of the same P
-    persons in the same E episodes; less than `gap` is not told apart.
+    persons in the same E episodes.
 
-    The interval is that of `interval_of_persons`.
+    `gain` and `others_gain` are those of the two feet (`gain_of`): that of the dearer one counts. The interval is that
+    of `interval_of_persons`.
     """
     shares = prices / others - 1.0
     of_persons = shares.mean(1)
@@ -86,8 +96,9 @@ def difference(prices: NDArray, others: NDArray, gap: float = GAP) -> Difference
     mean = float(of_persons.mean())
     signs = np.sign(of_persons)
     leaves_0_out = len(prices) > 1 and (low > 0.0 or high < 0.0)
-    apart = abs(mean) >= gap and leaves_0_out and bool((signs == signs[0]).all())
-    return Difference(mean=mean, low=low, high=high, persons=len(prices), gap=gap, told_apart=apart)
+    dearer, dearers_gain = (1.0 + mean, gain) if mean > 0.0 else (1.0 / (1.0 + mean), others_gain)
+    apart = dearer * (1.0 - dearers_gain) >= 1.0 and leaves_0_out and bool((signs == signs[0]).all())
+    return Difference(mean=mean, low=low, high=high, persons=len(prices), told_apart=apart)
 
 
 LEAST_CHANGE = 0.02
@@ -178,7 +189,7 @@ def comparison(
     return f"Compared at {speed:.2f} m/s walked{why}.{without}"
 
 
-def verdict(price: str, prices: Mapping[str, NDArray], gap: float = GAP) -> str:
+def verdict(price: str, prices: Mapping[str, NDArray], gains: Mapping[str, float] | None = None) -> str:
     """Return sentences on the foot of least price, those alike, the saving against the first, and the other feet.
 
     Feet that are neither alike nor told apart are uncertain, and have their interval. Of one person all changes are
@@ -187,21 +198,26 @@ def verdict(price: str, prices: Mapping[str, NDArray], gap: float = GAP) -> str:
     Args:
         price: name of the price, such as "fibre work".
         prices: name of a foot -> prices (P, E) of P persons in E episodes; one foot at least.
-        gap: least difference that is told apart.
+        gains: name of a foot -> its gain (`gain_of`); None: `GAIN` of each.
     """
     first = next(iter(prices))
     least = min(prices, key=lambda name: prices[name].mean())
     if len(prices) == 1:
         return f"{price.capitalize()} is known with {least} alone."
-    changes = {name: difference(values, prices[least], gap) for name, values in prices.items() if name != least}
+    gains = dict.fromkeys(prices, GAIN) if gains is None else gains
+    changes = {
+        name: difference(values, prices[least], gains[name], gains[least])
+        for name, values in prices.items()
+        if name != least
+    }
     sentence = f"{price.capitalize()} is least with {least}"
     if len(prices[least]) == 1:
         return f"{sentence}, of one person: no interval.{_against(least, changes)}"
     if alike := [name for name, change in changes.items() if change.alike]:
-        sentence += f", alike (within {100 * gap:g} %) with {_list(alike)}"
+        sentence += f", alike (within {100 * MOST_ALIKE:g} %) with {_list(alike)}"
     dearer = {name: change for name, change in changes.items() if change.told_apart}
     if dearer.pop(first, None):
-        sentence += f": {difference(prices[least], prices[first], gap).text} against {first}"
+        sentence += f": {difference(prices[least], prices[first]).text} against {first}"
     uncertain = [
         f"{name}, {change.to_digits(1)}" for name, change in changes.items() if not (change.alike or change.told_apart)
     ]

@@ -36,7 +36,7 @@ ANKLES = (50.0, 100.0, 150.0, 200.0, 300.0, 400.0)
 TOES = (7.0, 14.0, 28.0, 56.0, 84.0)
 """Stiffness of both toes [N m/rad], a quarter to three times that of toes in people."""
 NOT_DEARER = 0.05
-"""Share by which a price may exceed the least one and not be told apart from it; as `told_apart.GAP` of feet."""
+"""Share by which a price may exceed the least one and not be told apart from it; as `told_apart.GAIN` of feet."""
 AGREEING = 3
 """Persons needed, all in agreement, for a direction to be known."""
 BOTH_STIFFNESSES = ("ankle_N_m_rad", "toe_N_m_rad")

@@ -21,6 +21,7 @@ from springfoot.files.markdown import MISSING, table, text_of
 from ..base.intervals import interval_of_persons, known_sign, of_persons, visible
 from ..base.study import Answer, OnProgress, PersonsStudy
 from ..feet.both_feet import both, braced
+from ..feet.told_apart import gain_words
 from ..feet.walked_speeds import ASKED_SPEEDS, WALKED_SPEEDS, Row, at_walked_speeds, rows_csv
 from .condition_effects import Effect, Measured, by_condition, change, difference
 from .effect_experiments import LOCKED_TOE
@@ -132,7 +133,7 @@ class ToeJoint(PersonsStudy):
             f"Persons: {', '.join(self.persons)}; {self.what_ran} of each toe and commanded speed, {asked} m/s; falls "
             "are of all. People's effects are of docs/effects.csv; McDonald's people had one such foot. Persons of the "
             "package learned with locked and absent toes, passive feet, and springs of 10 to 180 beside the toe: where "
-            "locked is far from a spring of 1000, suspect the person, not the toe."
+            f"locked is far from a spring of 1000, suspect the person, not the toe. {gain_words('rigid_toe', 'no_toe')}"
         )
 
     def _commanded_speeds(self) -> Sequence[float]:

@@ -39,3 +39,5 @@ def test_quick_trains_a_cell_once_and_a_folder_of_another_training_is_refused(tm
 def test_a_policy_that_moves_no_person_is_refused(capsys, tmp_path):
     assert study_main(["specialists", "pretrained", "--quick", "--runs", str(tmp_path / "runs")]) == 2
     assert "pretrained moves no person" in capsys.readouterr().err
+    assert study_main(["specialists", "learned", "learned", "--runs", str(tmp_path / "runs")]) == 2
+    assert "learned is given 2 times; give each person once" in capsys.readouterr().err

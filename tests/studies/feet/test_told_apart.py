@@ -9,14 +9,16 @@ import pytest
 from springfoot.envs.settings import settings_from
 from springfoot.studies.feet.specialists import CELLS
 from springfoot.studies.feet.told_apart import (
-    GAP,
-    GAPS,
+    GAIN,
+    GAIN_OF_KIND,
     LEAST_CHANGE,
+    MOST_ALIKE,
     common_speed,
     comparison,
     difference,
-    gap_of,
-    gap_words,
+    gain_of,
+    gain_words,
+    least_told_apart,
     price_at,
     verdict,
     without_price,
@@ -38,7 +40,7 @@ def test_a_planted_difference_is_found_with_its_sign():
 
 
 @pytest.mark.parametrize(
-    "factors", [(1.0 + 0.9 * GAP,) * 3, (1.3, 1.3, 0.99)], ids=["below the gap", "one person disagrees"]
+    "factors", [(1.0 + 0.9 * GAIN,) * 3, (1.3, 1.3, 0.99)], ids=["within the gain", "one person disagrees"]
 )
 def test_what_is_not_told_apart(factors):
     prices = 3.0 * (1 + NOISE)
@@ -50,30 +52,42 @@ def test_a_foot_is_not_told_apart_from_itself_in_other_episodes():
     assert not difference(prices, prices[:, ::-1]).told_apart
 
 
-def test_gaps_are_no_smaller_than_those_that_specialists_have():
+def test_gains_are_no_smaller_than_those_of_specialists():
     with CSV.open(encoding="utf-8", newline="") as lines:
         rows = {row["cell"]: [abs(float(row[f"{price}_gap"])) for price in TWO_PRICES] for row in csv.DictReader(lines)}
     assert rows.keys() == CELLS.keys()
     weak, passive = (max(rows.pop(cell)) for cell in ("both calves of 25 %", "passive right foot, 300 N·m/rad"))
-    for found, gap in ((weak, GAPS["weak"]), (passive, GAPS["passive"]), (max(map(max, rows.values())), GAP)):
-        assert 0.6 * gap < found <= gap
-    assert gap_of([settings_from(left_foot=foot).left_foot for foot in ("intact", "rigid")]) == GAP
-    assert (
-        gap_of([settings_from(left_foot=foot).left_foot for foot in ("intact", {"kind": "weak", "strength": 0.3})])
-        == GAPS["weak"]
-    )
-    assert gap_words("weak", "intact") == (
-        "A person trained on with one foot alone may take less, by up to 22 % (weak) and 5 % (intact): "
-        "no less tells feet apart."
+    for found, gain in (
+        (weak, GAIN_OF_KIND["weak"]),
+        (passive, GAIN_OF_KIND["passive"]),
+        (max(map(max, rows.values())), GAIN),
+    ):
+        assert 0.6 * gain < found <= gain
+    feet = "intact", "rigid", {"kind": "weak", "strength": 0.3}
+    assert [gain_of(settings_from(left_foot=foot).left_foot) for foot in feet] == [GAIN, GAIN, GAIN_OF_KIND["weak"]]
+    assert gain_words("weak", "intact") == (
+        "A person trained on with one foot alone may take less: a foot is told from a cheaper one where it takes more "
+        "by 28 % (weak) and 5 % (intact)."
     )
 
 
-def test_a_larger_gap_tells_fewer_feet_apart():
-    prices = 3.0 * (1 + NOISE)
-    assert difference(0.9 * prices, prices, 0.09).told_apart and not difference(0.9 * prices, prices, 0.09).alike
-    assert difference(0.9 * prices, prices, 0.11).alike and not difference(0.9 * prices, prices, 0.11).told_apart
-    words = verdict("effort", {"none": FIRST, "4": 0.9 * FIRST}, 0.2)
-    assert words == "Effort is least with 4, alike (within 20 %) with none."
+def test_the_dearer_foot_must_stay_dearer_after_its_gain():
+    cheap = 3.0 * (1 + NOISE)
+    least = least_told_apart(0.2)
+    assert least == pytest.approx(0.25)
+    for factor, apart in ((1.0 + 0.99 * least, False), (1.0 + 1.01 * least, True)):
+        assert difference(factor * cheap, cheap, 0.2, 0.0).told_apart is apart
+        assert difference(cheap, factor * cheap, 0.0, 0.2).told_apart is apart
+        assert difference(factor * cheap, cheap, 0.0, 0.2).told_apart  # the cheaper one's gain widens the difference
+
+
+def test_a_foot_that_may_gain_is_uncertain_and_not_alike():
+    prices = {"none": FIRST, "4": 0.9 * FIRST}
+    assert verdict("effort", prices, {"none": 0.2, "4": 0.0}) == (
+        "Effort is least with 4. Uncertain against 4: none, +11.1 % (+11.1 to +11.1)."
+    )
+    assert verdict("effort", prices) == "Effort is least with 4: −10 % (−10 to −10) against none."
+    assert difference((1.0 + 0.9 * MOST_ALIKE) * FIRST, FIRST, 0.2).alike
 
 
 FIRST = np.full((3, 5), 4.0)
