@@ -117,7 +117,8 @@ def benchmark() -> str:
         "Submissions to the frozen tasks, each repeated by `springfoot judge`; at most eight a task. "
         "[The benchmark](benchmark.md) says what they are and how they are scored. *Drawn*: seeds and bodies that "
         "follow from the policy's digest. Trainings that differ in the seed alone are one entry: the interquartile "
-        "mean of their returns, with a 95 % bootstrap interval. `make benchmark` makes the entries of this project."
+        "mean of their returns, with a 95 % bootstrap interval; of all tasks, that of all their scores together. "
+        "`make benchmark` makes the entries of this project."
     )
     return f"# Leaderboard\n\n{words}\n\n{leaderboard(SUBMISSIONS)}"
 
