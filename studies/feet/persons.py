@@ -67,9 +67,13 @@ def _walked(preset: BipedSettings) -> BipedSettings:
 
 
 def feet_in_words(feet: Feet) -> str:
-    """Return kind and brace of a pair of feet, such as "intact, braced (both)" or, of the foot that is not intact,
-    "passive"; of two such feet that differ, the left one's."""
-    names = [f"{foot.kind}, braced" if foot.ankle.orthosis else foot.kind for foot in feet]
+    """Return kind, brace and added mass of a pair of feet, such as "intact, braced, heavier (both)" or, of the foot
+    that is not intact, "passive"; of two such feet that differ, the left one's."""
+    names = []
+    for foot in feet:
+        braced = ", braced" if foot.ankle.orthosis else ""
+        heavier = ", heavier" if foot.foot_mass_ratio > 1.0 else ""
+        names.append(foot.kind + braced + heavier)
     left, right = names
     if left == right:
         return left if left == "intact" else f"{left} (both)"

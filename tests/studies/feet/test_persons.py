@@ -5,6 +5,26 @@ import csv
 import pytest
 
 from springfoot.cli.main import study_main
+from springfoot.envs.settings.feet import FootSetting
+from springfoot.studies.feet.persons import feet_in_words
+
+BRACE = {"orthosis": {"ankle_stiffness": 150.0}}
+HEAVIER = {"kind": "intact", "foot_mass_ratio": 3.0}
+
+
+@pytest.mark.parametrize(
+    ("left", "right", "words"),
+    [
+        ("intact", "intact", "intact"),
+        ("intact", "rigid", "rigid"),
+        ("drop", "intact", "drop"),
+        (HEAVIER, HEAVIER, "intact, heavier (both)"),
+        (HEAVIER | BRACE, HEAVIER | BRACE, "intact, braced, heavier (both)"),
+        ("intact", {"kind": "weak", "strength": 0.5} | BRACE, "weak, braced"),
+    ],
+)
+def test_feet_are_told_by_kind_brace_and_mass_that_is_added(left, right, words):
+    assert feet_in_words((FootSetting(left).foot, FootSetting(right).foot)) == words
 
 
 @pytest.mark.slow
