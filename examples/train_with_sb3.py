@@ -44,7 +44,7 @@ def main() -> None:
         device="cpu",
     )
     ppo.learn(args.timesteps)
-    save_policy(args.out, policy_from_sb3(ppo))  # with the statistics of its VecNormalize
+    save_policy(args.out, policy_from_sb3(ppo, ignore_unvaried=True))  # with the statistics of VecNormalize
 
     policy, settings = policy_and_settings(str(args.out), {"episode_seconds": args.seconds})
     walk = record(policy, settings, name=args.out.stem, episodes=1)

@@ -3,11 +3,12 @@
 Submissions of one name but for ", seed N" are one entry: the trainings of a learner.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
+from springfoot.arrays import NDArray
 from springfoot.files.markdown import MISSING, table
 from springfoot.tasks import STIFFNESS_TASKS, TASKS, VERSION
 
@@ -23,7 +24,8 @@ def leaderboard(folder: Path) -> str:
     """Return Markdown of the judged submissions below a folder: the scores of learners, then a section for each task
     that has submissions, its best `MOST_ROWS` entries."""
     rows = judged_rows(folder)
-    parts = [text] if (text := _scores_section(learner_scores(rows))) else []
+    public, drawn = learner_scores(rows), learner_scores(rows, "drawn_return_mean")
+    parts = [text] if (text := _scores_section(public, drawn)) else []
     head = ["entry", "return", "falls", "return, drawn", "falls, drawn"]
     for task in TASKS:
         entries: dict[str, list[JudgedRow]] = {}
@@ -51,23 +53,36 @@ def _cells(name: str, rows: Sequence[JudgedRow]) -> list[str]:
     ]
 
 
-def _scores_section(scores: LearnerScores) -> str:
-    """Return the Markdown section of the learners' scores: a row for each task that sets stiffness; empty without."""
-    learners = {name: by_task for name, by_task in scores.items() if name != SCHEDULE}
+def _scores_section(public: LearnerScores, drawn: LearnerScores) -> str:
+    """Return the Markdown section of the learners' scores: two tables with a row for each task that sets stiffness;
+    empty without learners."""
+    learners = [name for name in public if name != SCHEDULE]
     if not learners:
         return ""
     tasks = [f"{name}-{VERSION}" for name in STIFFNESS_TASKS]
+    run = [task for task in tasks if any(task in public[name] for name in learners)]
+    above = [task for task in run if any(_beats_springs(task, public[name], drawn.get(name, {})) for name in learners)]
+    words = [f"Better than the best constant springs, with all of both intervals: {', '.join(above) or 'nowhere'}."]
+    if below := [task for task in run if task not in above]:
+        words.append(f"Not better: {', '.join(below)}.")
+    if len(run) < len(tasks):
+        words.append("`make benchmark` trains our PPO where no learner has run.")
+    tables = [_scores_table("score", tasks, public), _scores_table("score, drawn", tasks, drawn)]
+    return "\n\n".join(["## Learners", *tables, " ".join(words)])
+
+
+def _scores_table(head: str, tasks: Sequence[str], scores: LearnerScores) -> str:
+    """Return the Markdown table of scores: a row for each of `tasks`, and one for all of them together."""
     lines = []
     for task in tasks:
         own = (by_task.get(task) for by_task in scores.values())
         lines.append([task, *("not run" if each is None else interval_text([each], ".2f") for each in own)])
     whole = [[by_task[task] for task in tasks] if {*tasks} <= by_task.keys() else None for by_task in scores.values()]
     lines.append(["all", *(MISSING if each is None else interval_text(each, ".2f") for each in whole)])
-    run = [task for task in tasks if any(task in own for own in learners.values())]
-    above = [task for task in run if any(task in own and interval([own[task]])[1] > 1.0 for own in learners.values())]
-    words = [f"Better than the best constant springs, with all of an interval: {', '.join(above) or 'nowhere'}."]
-    if below := [task for task in run if task not in above]:
-        words.append(f"Not better: {', '.join(below)}.")
-    if len(run) < len(tasks):
-        words.append("`make benchmark` trains our PPO where no learner has run.")
-    return f"## Learners\n\n{table(['score', *scores], lines)}\n\n{' '.join(words)}"
+    return table([head, *scores], lines)
+
+
+def _beats_springs(task: str, *scores: Mapping[str, NDArray]) -> bool:
+    """Return whether a learner's score on a task lies above 1 with all of its interval, by each of `scores`, task ->
+    scores."""
+    return all(task in by_task and interval([by_task[task]])[1] > 1.0 for by_task in scores)

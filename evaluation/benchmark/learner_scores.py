@@ -1,10 +1,12 @@
 """Compare learners by the scores of their trainings, as Agarwal et al. (2021, Deep RL at the edge of the statistical
 precipice, NeurIPS) ask: interquartile means with stratified bootstrap intervals, and performance profiles.
 
-A score is 0 for random stiffness, 1 for the best constant springs of the task, and linear in the return.
+A score is 0 for random stiffness, 1 for the best constant springs of the task, and linear in the return: that on the
+public seeds, or that on seeds and bodies drawn from each policy's digest.
 """
 
 from collections.abc import Mapping, Sequence
+from typing import Literal
 
 import numpy as np
 from scipy.stats import bootstrap, trim_mean
@@ -20,34 +22,38 @@ RANDOM, CONSTANT = "random", "constant"
 SCHEDULE = "schedule"
 """Baseline that has a score as a learner has."""
 
+Return = Literal["return_mean", "drawn_return_mean"]
+"""Return of a judged submission: public, or drawn."""
 LearnerScores = Mapping[str, Mapping[str, NDArray]]
 """Learner -> task -> (S,) score of each training [-]."""
 
 
-def baseline_returns(rows: Sequence[JudgedRow]) -> dict[tuple[str, str], float]:
+def baseline_returns(rows: Sequence[JudgedRow], of: Return = "return_mean") -> dict[tuple[str, str], float]:
     """Return (baseline, task) -> highest mean return of random stiffness and of constant springs."""
     ends: dict[tuple[str, str], float] = {}
     for row in rows:
         task, kind = row.submission.task, row.submission.policy.partition(":")[0]
         if kind in (RANDOM, CONSTANT):
-            ends[kind, task] = max(row.return_mean, ends.get((kind, task), -np.inf))
+            ends[kind, task] = max(getattr(row, of), ends.get((kind, task), -np.inf))
     return ends
 
 
-def learner_scores(rows: Sequence[JudgedRow]) -> LearnerScores:
+def learner_scores(rows: Sequence[JudgedRow], of: Return = "return_mean") -> LearnerScores:
     """Return the scores of `SCHEDULE` and of the entries with several trainings, on the tasks that have both
-    baselines."""
-    ends = baseline_returns(rows)
+    baselines, with different returns."""
+    ends = baseline_returns(rows, of)
+    both = {task for _, task in ends if {(RANDOM, task), (CONSTANT, task)} <= ends.keys()}
+    tasks = {task for task in both if ends[RANDOM, task] != ends[CONSTANT, task]}
     returns: dict[str, dict[str, list[float]]] = {}
     for row in rows:
         entry = SCHEDULE if row.submission.policy == SCHEDULE else row.entry
-        returns.setdefault(entry, {}).setdefault(row.submission.task, []).append(row.return_mean)
+        returns.setdefault(entry, {}).setdefault(row.submission.task, []).append(getattr(row, of))
     scores = {}
     for learner, by_task in returns.items():
         own = {
             task: (np.array(values) - ends[RANDOM, task]) / (ends[CONSTANT, task] - ends[RANDOM, task])
             for task, values in by_task.items()
-            if (len(values) > 1 or learner == SCHEDULE) and {(RANDOM, task), (CONSTANT, task)} <= ends.keys()
+            if (len(values) > 1 or learner == SCHEDULE) and task in tasks
         }
         if own:
             scores[learner] = own

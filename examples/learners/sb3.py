@@ -42,7 +42,7 @@ def main(
     model = learner("MlpPolicy", envs, learning_rate=1e-3, gamma=0.98, seed=seed, device="cpu", **own)
     if timesteps:
         model.learn(timesteps)
-    save_policy(out, policy_from_sb3(model))  # with the statistics of its VecNormalize
+    save_policy(out, policy_from_sb3(model, ignore_unvaried=True))  # without body and speed where neither varied
 
 
 if __name__ == "__main__":

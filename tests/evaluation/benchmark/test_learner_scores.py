@@ -14,13 +14,11 @@ from springfoot.tasks import STIFFNESS_TASKS, VERSION
 WALK, PUSHED = f"Walk-{VERSION}", f"Pushed-{VERSION}"
 
 
-def row(name, task, policy, return_mean):
+def row(name, task, policy, return_mean, drawn=0.0):
     """Return a judged submission, with the numbers that scores read."""
     walks = TaskWalks(returns=np.full(EPISODES, return_mean), fell=np.zeros(EPISODES, bool))
     submission = Submission(folder=Path(), name=name, task=task, policy=policy, digest="", walks=walks)
-    return JudgedRow(
-        submission=submission, return_mean=return_mean, falls=0, drawn_return_mean=return_mean, drawn_falls=0
-    )
+    return JudgedRow(submission=submission, return_mean=return_mean, falls=0, drawn_return_mean=drawn, drawn_falls=0)
 
 
 def trainings(name, task, *returns):
@@ -39,6 +37,13 @@ def test_a_score_is_linear_between_random_and_the_best_constant_springs():
     scores = learner_scores([*ENDS, *trainings("ours", WALK, 100.0, 300.0, 500.0)])
     assert scores.keys() == {"ours"}
     np.testing.assert_allclose(scores["ours"][WALK], [0.0, 1.0, 2.0], atol=1e-12)
+
+
+def test_drawn_returns_have_scores_of_their_own_and_none_where_both_baselines_return_the_same():
+    ends = [row("random", WALK, "random", 1.0, 10.0), row("springs", WALK, "constant:50,10", 2.0, 20.0)]
+    ours = [row(f"ours, seed {seed}", WALK, "policy", 1.5, drawn) for seed, drawn in enumerate((10.0, 40.0))]
+    np.testing.assert_allclose(learner_scores([*ends, *ours], "drawn_return_mean")["ours"][WALK], [0.0, 3.0])
+    assert learner_scores([*ENDS, *trainings("ours", WALK, 100.0, 300.0)], "drawn_return_mean") == {}
 
 
 def test_one_training_has_no_spread_and_a_task_without_baselines_no_score():

@@ -281,12 +281,13 @@ def a_judgement(submission):
     return {"task": submission.task, "policy_digest": submission.digest, **numbers}
 
 
-def entered(submission, folder, *, first_return, mean=1.0):
+def entered(submission, folder, *, first_return, mean=1.0, drawn=2.0):
     """Copy a submission into a new folder under the folder's name, judged, with another return in its first episode."""
     values = read_object(copied(submission, folder) / benchmark.SUBMISSION, "submission")
     values |= {"name": folder.name, "returns": [first_return, *values["returns"][1:]]}
     (folder / benchmark.SUBMISSION).write_bytes(object_with_digest(values))
-    (folder / benchmark.JUDGED).write_bytes(object_with_digest(a_judgement(submission) | {"return_mean": mean}))
+    means = {"return_mean": mean, "drawn_return_mean": drawn}
+    (folder / benchmark.JUDGED).write_bytes(object_with_digest(a_judgement(submission) | means))
 
 
 def test_a_table_has_eight_rows_and_says_how_many_more_there_are(submitted, tmp_path):
@@ -298,11 +299,15 @@ def test_a_table_has_eight_rows_and_says_how_many_more_there_are(submitted, tmp_
     assert board.endswith("2 more are not shown.")
 
 
-def test_trainings_of_one_learner_are_one_entry_with_a_score(submitted, tmp_path):
-    entries = [("random", "random", 1.0), ("springs", "constant:300,40", 3.0)]
-    entries += [(f"ours, seed {seed}", "quasi_stiffness", 4.0 + seed) for seed in (0, 1)]
-    for name, policy, mean in entries:
-        entered(submitted[1], tmp_path / name, first_return=mean, mean=mean)
+@pytest.mark.parametrize(
+    ("springs_drawn", "drawn", "better"),
+    [(4.0, "2.25 (2.00 to 2.50)", f"{TASK}. `"), (12.0, "0.75 (0.67 to 0.83)", f"nowhere. Not better: {TASK}. `")],
+)
+def test_trainings_of_one_learner_are_one_entry_with_both_scores(submitted, tmp_path, springs_drawn, drawn, better):
+    entries = [("random", "random", 1.0, 0.0), ("springs", "constant:300,40", 3.0, springs_drawn)]
+    entries += [(f"ours, seed {seed}", "quasi_stiffness", 4.0 + seed, 8.0 + 2.0 * seed) for seed in (0, 1)]
+    for name, policy, mean, drawn_mean in entries:
+        entered(submitted[1], tmp_path / name, first_return=mean, mean=mean, drawn=drawn_mean)
         own = {"policy": policy, "policy_digest": sha256(policy.encode()).hexdigest()}
         values = read_object(tmp_path / name / benchmark.SUBMISSION, "submission") | own
         (tmp_path / name / benchmark.SUBMISSION).write_bytes(object_with_digest(values))
@@ -310,7 +315,8 @@ def test_trainings_of_one_learner_are_one_entry_with_a_score(submitted, tmp_path
         (tmp_path / name / benchmark.JUDGED).write_bytes(object_with_digest(judged))
     board = leaderboard(tmp_path)
     assert f"| {TASK} | 1.75 (1.50 to 2.00) |" in board  # 4 and 5, where random returns 1 and springs 3
-    assert f"with all of an interval: {TASK}. `make benchmark` trains our PPO" in board
+    assert f"| {TASK} | {drawn} |" in board
+    assert f"with all of both intervals: {better}make benchmark` trains our PPO" in board
     assert "| ours (2 seeds) | 4 (4 to 5) |" in board and "seed 0" not in board
 
 

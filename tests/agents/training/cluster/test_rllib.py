@@ -16,7 +16,7 @@ import pytest
 
 from springfoot.agents import load_policy, train
 from springfoot.agents.policies.policy import Policy
-from springfoot.agents.training.config import PRESETS, TrainingConfig
+from springfoot.agents.training.config import PRESETS, TrainingConfig, task_training
 from springfoot.agents.training.returns import evaluate_returns
 from springfoot.agents.training.run_record import is_of_rllib, read_record
 from springfoot.cli.train import train_main
@@ -127,8 +127,8 @@ def test_a_mirrored_network_acts_and_values_alike_on_both_sides(tmp_path):
 
 
 def test_two_nodes_learn_as_much_as_our_own_trainer_of_as_many_samples(cluster, tmp_path):
-    """Of 500,000 pushed steps: at least .95 of its return, mean of 20 other episodes, and no fall."""
-    config = dataclasses.replace(PRESETS["walk"], timesteps=500_000)
+    """Of 500,000 steps of the task Walk-v0: at least .95 of its return, mean of 20 other episodes, and no fall."""
+    config = dataclasses.replace(task_training("Walk-v0"), timesteps=500_000)
     train(config, tmp_path / "ours")
     rllib_training.train(config, tmp_path / "rllib", num_env_runners=2)
     biped = Biped(config.environment, 20, 2)
