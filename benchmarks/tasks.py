@@ -3,9 +3,9 @@
     make benchmark
     make benchmark BENCHMARK="--learners sac --tasks Walk-v0"
 
-Each is submitted and judged once, in benchmarks/submissions; the same command goes on after a stop. The best constant
-springs are chosen from `ANKLES` x `TOES` by 24 episodes with seeds that no submission has. Other learners than our PPO
-train by examples/learners/sb3.py, in the virtual environment of `make test-learners`.
+Each is trained, submitted and judged once, in benchmarks/submissions; the same command goes on after a stop. The best
+constant springs are chosen from `ANKLES` x `TOES` by 24 episodes with seeds that no submission has. Other learners than
+our PPO train by examples/learners/sb3.py, in the virtual environment of `make test-learners`.
 """
 
 import argparse
@@ -134,13 +134,15 @@ def main() -> None:
             springs = best_constant(task)
             submit_and_judge(springs, task, f"best {springs}", SUBMISSIONS / task / "constant")
     for learner in flags.learners:
+        folders = {run: SUBMISSIONS / run[0] / label_of(learner, flags.timesteps, run[1]) for run in runs}
+        left = [run for run in runs if not (folders[run] / JUDGED).exists()]
         if learner == "ppo":
-            policies = train_ours(runs, flags.timesteps, flags.engine)
+            policies = train_ours(left, flags.timesteps, flags.engine)
         else:
-            policies = train_others(learner, runs, flags.timesteps)
+            policies = train_others(learner, left, flags.timesteps)
         for (task, seed), policy in policies.items():
             name = f"{NAMES[learner]}, {flags.timesteps:,} steps, seed {seed}"
-            submit_and_judge(policy, task, name, SUBMISSIONS / task / label_of(learner, flags.timesteps, seed))
+            submit_and_judge(policy, task, name, folders[task, seed])
 
 
 if __name__ == "__main__":

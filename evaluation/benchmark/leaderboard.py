@@ -64,11 +64,14 @@ def _scores_section(public: LearnerScores, drawn: LearnerScores) -> str:
     tasks = [f"{name}-{VERSION}" for name in STIFFNESS_TASKS]
     run = [task for task in tasks if any(task in public[name] for name in learners)]
     above = [task for task in run if any(_beats_springs(task, public[name], drawn.get(name, {})) for name in learners)]
-    words = [f"Better than the best constant springs, with all of both intervals: {', '.join(above) or 'nowhere'}."]
+    words = [
+        "0 is random stiffness, 1 the best constant springs. Some learner is better than these, with all of both "
+        f"intervals, on: {', '.join(above) or 'no task'}."
+    ]
     if below := [task for task in run if task not in above]:
         words.append(f"Not better: {', '.join(below)}.")
     if any(task not in public[name] for name in learners for task in tasks):
-        words.append(f"What is not run: `{NOT_RUN}`, or another learner and task.")
+        words.append(f"A cell that is not run: `{NOT_RUN}`, or likewise with its learner and task.")
     tables = [_scores_table("score", tasks, public), _scores_table("score, drawn", tasks, drawn)]
     return "\n\n".join(["## Learners", *tables, " ".join(words)])
 

@@ -301,7 +301,7 @@ def test_a_table_has_eight_rows_and_says_how_many_more_there_are(submitted, tmp_
 
 @pytest.mark.parametrize(
     ("springs_drawn", "drawn", "better"),
-    [(4.0, "2.25 (2.00 to 2.50)", f"{TASK}."), (12.0, "0.75 (0.67 to 0.83)", f"nowhere. Not better: {TASK}.")],
+    [(4.0, "2.25 (2.00 to 2.50)", f"{TASK}."), (12.0, "0.75 (0.67 to 0.83)", f"no task. Not better: {TASK}.")],
 )
 def test_trainings_of_one_learner_are_one_entry_with_both_scores(submitted, tmp_path, springs_drawn, drawn, better):
     entries = [("random", "random", 1.0, 0.0), ("springs", "constant:300,40", 3.0, springs_drawn)]
@@ -316,7 +316,7 @@ def test_trainings_of_one_learner_are_one_entry_with_both_scores(submitted, tmp_
     board = leaderboard(tmp_path)
     assert f"| {TASK} | 1.75 (1.50 to 2.00) |" in board  # 4 and 5, where random returns 1 and springs 3
     assert f"| {TASK} | {drawn} |" in board
-    assert f"with all of both intervals: {better} What is not run: `make benchmark " in board
+    assert f"with all of both intervals, on: {better} A cell that is not run: `make benchmark " in board
     assert "| ours (2 seeds) | 4 (4 to 5) |" in board and "seed 0" not in board
 
 
