@@ -116,11 +116,13 @@ _BRACE = {"ankle_stiffness": [20, 520], "ankle_deg": [-8, 4]}
 _ONE_WAY = _BRACE | {"engages": "dorsiflexion"}
 _HEAVIER = {"shank_mass_ratio": [1.0, 1.3], "foot_mass_ratio": [1.0, 2.0]}
 _WEAK = {"kind": "weak", "strength": [0.15, 0.6]}
+PASSIVE_RANGES = ((150, 1500), (15, 200))
+"""Stiffness of ankle and toe of the passive feet that a person learns to walk on [N m/rad]."""
 _PASSIVE = {
     "kind": "passive",
-    "ankle_stiffness": [150, 1500],
+    "ankle_stiffness": list(PASSIVE_RANGES[0]),
     "ankle_deg": [0, 8],
-    "toe_stiffness": [15, 200],
+    "toe_stiffness": list(PASSIVE_RANGES[1]),
     "shank_mass_ratio": [0.6, 1.1],
 }
 DRAWN_FEET: list[dict[str, Any]] = [

@@ -223,7 +223,7 @@ class BipedSettings:
     """Source of the stiffness where the action moves the person: the action, with `acts` `person` the fixed schedule;
     that schedule always (schedule); the schedule times a
     factor drawn at each reset (scaled); one drawn stiffness of the ankles and one of the toes (constant); one drawn
-    anew in every step (random); or a drawn one of these, mostly the action (drawn)."""
+    anew in every step (random); or a drawn one of these, mostly the action (drawn). Devices keep their own."""
     human: OwnGait | None = field(default=None, metadata=_REFERENCE)
     """One person's own walk in place of people's, JSON form of `springfoot.gait.people.own_data.OwnGait` (on the
     command line a CSV, OpenSim or C3D file): posture, forces, feed-forward, and at cadence `people` the step time

@@ -11,6 +11,7 @@ searches would add their luck to the change with speed.
 """
 
 import json
+import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
@@ -258,10 +259,9 @@ class PlanTuning(Study):
 
     @contextmanager
     def _mapping(self) -> Iterator[Callable[..., Iterable[float]]]:
-        """Yield `map`, or with several `processes` its equivalent that calls the function in them."""
-        if self.processes == 1:
-            yield map
-            return
+        """Yield the equivalent of `map` that calls the function in `processes` of one thread each: with threads of BLAS
+        beside them a price takes two to three times as long."""
+        os.environ.setdefault("OMP_NUM_THREADS", "1")  # for their NumPy; that of this process has begun
         # They leave Ctrl-C to this process. None is a copy of this one: a copy would lack its threads.
         how = {"mp_context": get_context("spawn"), "initializer": signal, "initargs": (SIGINT, SIG_IGN)}
         with ProcessPoolExecutor(self.processes, **how) as pool:

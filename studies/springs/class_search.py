@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import cma
 import numpy as np
@@ -13,14 +13,22 @@ from springfoot.agents.policies import find_policy
 from springfoot.arrays import NDArray
 from springfoot.envs.batch import Biped
 from springfoot.evaluation.numbers import measure
-from springfoot.evaluation.recording import Episodes, Recording, planned_course, policy_and_settings, record_walk
+from springfoot.evaluation.recording import (
+    Episodes,
+    Recording,
+    planned_course,
+    policy_and_settings,
+    record_feet,
+    record_walk,
+)
 from springfoot.gait.body import ANKLE_TENDON
+from springfoot.gait.springs import SPRINGS
 
 from ..base.columns import COMPARED_JOINTS
 from ..base.kept import Kept, known_as
 from ..base.study import OnProgress
 from ..searches.cma_search import generations
-from .links import UNDISTURBED_WALK, UNIT_OF_AIM
+from .links import FOOT_WORK, UNDISTURBED_WALK, UNIT_OF_NUMBER
 from .stiffness_classes import StiffnessClass
 
 FALL_COST = 4.0
@@ -55,6 +63,8 @@ class Condition(NamedTuple):
 
 Candidate = tuple[StiffnessClass, NDArray]
 """Class of stiffness, and one of its vectors."""
+Owner = Literal["person", "foot"]
+"""Owner of the stiffness: both ankles and toes of the person, or an adaptive right foot."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,7 +72,9 @@ class PersonsSearch:
     """Searches and tests of one person, with kept costs and numbers."""
 
     person: str
-    """Policy that moves the person."""
+    """Policy that moves the person, and beside an adaptive foot sets the other foot's stiffness."""
+    owner: Owner
+    """Owner of the stiffness."""
     seconds: float
     """Length of each episode."""
     seed: int
@@ -161,6 +173,12 @@ class PersonsSearch:
         self, of_class: StiffnessClass, vectors: Sequence[NDArray], seed: int, episodes: int, condition: Condition
     ) -> list[Recording]:
         """Record the same episodes with each of V vectors, side by side; return a recording for each."""
+        if self.owner == "foot":
+            given = {"episode_seconds": self.seconds, **condition._asdict()}
+            acting, settings = policy_and_settings(self.person, given)
+            feet = [{"right_foot": of_class.foot(vector)} for vector in vectors]
+            how: dict[str, Any] = {"threads": self.threads, "progress": self.progress}
+            return record_feet(acting, settings, feet, name=of_class.name, episodes=episodes, seed=seed, **how)
         person = str(find_policy(self.person))
         biped = _batch(person, self.seconds, condition, len(vectors) * episodes, self.threads)
         settings = biped.settings
@@ -184,7 +202,8 @@ class PersonsSearch:
     @property
     def _in_question(self) -> list[Any]:
         """Return the parts of every question, on which all costs and numbers depend."""
-        return [known_as(self.person), self.seconds, self.seed, self.population, self.push_newton]
+        owner = [] if self.owner == "person" else [self.owner]
+        return [known_as(self.person), self.seconds, self.seed, self.population, self.push_newton, *owner]
 
 
 @lru_cache(maxsize=8)
@@ -197,11 +216,17 @@ def _batch(person: str, seconds: float, condition: Condition, count: int, thread
 
 
 def aim_numbers(recording: Recording) -> dict[str, Any]:
-    """Return speed and the number of each `Aim` of a recording, from its metrics; None of all if one is missing."""
+    """Return speed, the number of each `Aim` and, on unlike feet, `FOOT_WORK` of a recording, from its metrics; None of
+    all if one is missing."""
     metrics = measure(recording).metrics
     angles = [metrics["joints"][joint]["rmse_deg"] for joint in COMPARED_JOINTS]
     fibre = metrics["effort"]["fibre_J_kg_m"]
     speed = metrics["speed_m_s"]["mean"]
-    if None in (*angles, fibre, speed):
-        return {"speed_m_s": None, **dict.fromkeys(UNIT_OF_AIM)}
-    return {"speed_m_s": speed, "fibre": fibre, "likeness": float(np.mean(angles))}
+    of_legs = metrics["per_leg"]  # None on like feet
+    work = [] if of_legs is None else [of_legs["right"]["joint_work_J_kg"][joint] for joint in SPRINGS]
+    if None in (*angles, fibre, speed, *(joint["positive"] for joint in work)):
+        return {"speed_m_s": None, **dict.fromkeys(UNIT_OF_NUMBER)}
+    numbers = {"speed_m_s": speed, "fibre": fibre, "likeness": float(np.mean(angles))}
+    if work:
+        numbers[FOOT_WORK] = sum(joint["positive"] - joint["negative"] for joint in work)
+    return numbers

@@ -16,8 +16,10 @@ Pair = tuple[Mapping[str, Sequence[Any]], Mapping[str, Sequence[Any]]]
 number, None where it could not be measured, as lists with an entry for each episode."""
 Aim = Literal["fibre", "likeness"]
 """Aim of a search: least fibre work a metre; least mean over joints of the angles' rms from people's mean."""
-UNIT_OF_AIM: dict[str, str] = dict(zip(get_args(Aim), ("J/kg/m", "°"), strict=True))
-"""Aim -> unit of its number."""
+FOOT_WORK = "foot work"
+"""Net work of an adaptive right foot's ankle and toe in a stride, > 0 where it gives more than it takes."""
+UNIT_OF_NUMBER: dict[str, str] = dict(zip((*get_args(Aim), FOOT_WORK), ("J/kg/m", "°", "J/kg"), strict=True))
+"""Aim, or `FOOT_WORK` -> unit of its number."""
 UNDISTURBED_WALK = "undisturbed"
 """Condition without pushes, on even ground, in words."""
 
@@ -144,8 +146,8 @@ def verdict(links: Sequence[Link]) -> str:
         here = [link for link in links if link.aim == aim and link.condition == UNDISTURBED_WALK]
         seen = [link for link in here if link.high is not None and link.high < 0.0]
         gains = [
-            f"{link.inner} → {link.outer} {link.difference:+.3f} [{link.low:.3f}, {link.high:.3f}] {UNIT_OF_AIM[aim]} "
-            f"({100 * link.difference / link.inner_mean:+.1f} %)"
+            f"{link.inner} → {link.outer} {link.difference:+.3f} [{link.low:.3f}, {link.high:.3f}] "
+            f"{UNIT_OF_NUMBER[aim]} ({100 * link.difference / link.inner_mean:+.1f} %)"
             for link in seen
             if link.difference is not None and link.inner_mean is not None
         ]
@@ -171,7 +173,7 @@ def links_table(links: Sequence[Link]) -> str:
         level = here[conditions[0]]
         falls = [f"{here[name].inner_falls}, {here[name].outer_falls} of {here[name].episodes}" for name in conditions]
         lines.append([" → ".join(names), text_of(level.inner_mean, ".2f"), _difference(level), *falls])
-    unit = UNIT_OF_AIM[links[0].aim]
+    unit = UNIT_OF_NUMBER[links[0].aim]
     return table(["classes", f"inner, {unit}", f"outer less inner, {unit}", *conditions], lines)
 
 

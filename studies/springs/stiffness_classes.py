@@ -1,18 +1,20 @@
 """Define nested classes of stiffness: constant, by phase, open loop, and a linear reflex on top of it.
 
-A class has a K of the ankle and of the toe for each part of its own stride, the same for both legs; a reflex besides
-multiplies the ankle's K by exp(sum of gain x error). The parts of a class divide those of the class before it, and
-gains may be 0, so that each class has every stiffness of the class before it, to the bit.
+A class has a K of the ankle and of the toe for each part of its own stride, the same for both legs, or of one adaptive
+foot; a reflex besides multiplies the ankle's K by exp(sum of gain x error). The parts of a class divide those of the
+class before it, and gains may be 0, so that each class has every stiffness of the class before it, to the bit.
 """
 
 from collections import deque
 from dataclasses import dataclass, replace
 from math import ceil
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from springfoot.agents.policies import PolicyFunction, leg_phase
+from springfoot.agents.training import PASSIVE_RANGES
 from springfoot.arrays import NDArray
 from springfoot.envs.control import action_of
 from springfoot.envs.settings import BipedSettings, body_of, reference_gait
@@ -25,6 +27,8 @@ CENTRE = (250.0, TOE_STIFFNESS)
 1.20 m/s; people's toe."""
 RANGES = ((BipedSettings().ankle_stiffness_range[0], ANKLE_TENDON), BipedSettings().toe_stiffness_range)
 """Least and largest K of ankle and toe [N m/rad]; the ankle's largest is that of the tendon in series."""
+FOOT_REST = 0.0
+"""Rest angle of an adaptive foot's springs [rad], the one that a person is told of such a foot."""
 LONGEST_PART = 0.1
 """Longest part of the stride with one K in open loop; chosen: five decisions of 20 ms."""
 ERRORS = {"speed_error": 0.05, "com_x_error": 0.05, "com_z_error": 0.02}
@@ -49,6 +53,8 @@ class StiffnessClass:
     """The same of the ankle's gains; empty without a reflex."""
     late: int = 0
     """Steps by which the errors that a reflex reads are older than the body's; at first it reads the first ones."""
+    ranges: tuple[tuple[float, float], ...] = RANGES
+    """Least and largest K of ankle and toe [N m/rad]."""
 
     @property
     def size(self) -> int:
@@ -69,13 +75,13 @@ class StiffnessClass:
     def policy(self, vectors: ArrayLike, settings: BipedSettings) -> PolicyFunction:
         """Return the policy for N environments that sets in each the stiffness of its row of `vectors` (N, size).
 
-        K stays within `RANGES`, for the body. A reflex that is `late` remembers errors: its policy is for one walk.
+        K stays within `ranges`, for the body. A reflex that is `late` remembers errors: its policy is for one walk.
         """
         ankle, toe, gains = self.split(vectors)
         rows = np.arange(len(ankle))[:, None]  # (N, 1), beside indices (N, side)
         body = body_of(settings)
         centre = np.array(CENTRE) * body.stiffness_scale
-        lowest, highest = np.transpose(RANGES) * body.stiffness_scale
+        lowest, highest = np.transpose(self.ranges) * body.stiffness_scale
         read: deque[NDArray] = deque(maxlen=self.late + 1)  # the errors of the last steps
 
         def act(observation: NDArray) -> NDArray:
@@ -96,10 +102,19 @@ class StiffnessClass:
 
     def stiffness(self, vector: ArrayLike, phase: NDArray) -> NDArray:
         """Return ankle's and toe's K (n, 2) [N m/rad] of one vector at stride phases (n,), for 1.70 m and 63 kg and
-        without errors, within `RANGES`."""
+        without errors, within `ranges`."""
         ankle, toe, _ = self.split(vector)
         parts = np.stack([ankle[_part_index(self.ankle, phase)], toe[_part_index(self.toe, phase)]], -1)
-        return np.clip(np.array(CENTRE) * np.exp(parts), *np.transpose(RANGES))
+        return np.clip(np.array(CENTRE) * np.exp(parts), *np.transpose(self.ranges))
+
+    def foot(self, vector: ArrayLike) -> dict[str, Any]:
+        """Return the setting of an adaptive foot with the stiffness of one vector, on any body, at rest at
+        `FOOT_REST`."""
+        ankle, toe = (
+            [[start, float(self.stiffness(vector, np.array([start]))[0, joint]), FOOT_REST] for start in starts]
+            for joint, starts in enumerate((self.ankle, self.toe))
+        )
+        return {"kind": "adaptive", "schedule": {"ankle": ankle, "toe": toe}}
 
 
 def widened(vector: ArrayLike, inner: StiffnessClass, outer: StiffnessClass) -> NDArray:
@@ -113,7 +128,7 @@ def widened(vector: ArrayLike, inner: StiffnessClass, outer: StiffnessClass) -> 
 
 
 def nested_classes(settings: BipedSettings) -> tuple[StiffnessClass, ...]:
-    """Return the four classes, each within the next.
+    """Return the four classes of both legs' stiffness, each within the next.
 
     The phases are the thesis's: its events of ankle and toe, in the angles that the settings' body follows, part them.
     """
@@ -128,6 +143,19 @@ def nested_classes(settings: BipedSettings) -> tuple[StiffnessClass, ...]:
         open_loop,
         replace(open_loop, name="linear reflex", gains=ankle),
     )
+
+
+def classes_of_foot(settings: BipedSettings) -> tuple[StiffnessClass, ...]:
+    """Return the four classes of an adaptive foot's stiffness, each within the next, as far as a person has learned
+    such feet.
+
+    They are those of both legs, without the reflex and with a second one, whose K changes only while the foot is in the
+    air, where that takes no work. The first is a passive foot.
+    """
+    constant, per_phase, open_loop, _ = nested_classes(settings)
+    stance_and_swing = (0.0, per_phase.ankle[-1])  # toe-off
+    in_the_air = replace(constant, name="in the air", ankle=stance_and_swing, toe=stance_and_swing)
+    return tuple(replace(each, ranges=PASSIVE_RANGES) for each in (constant, in_the_air, per_phase, open_loop))
 
 
 def _part_index(starts: ArrayLike, phase: ArrayLike) -> NDArray:

@@ -1,6 +1,7 @@
 """Tell the gain of varying ankle and toe stiffness within the step, for persons that stay as they are.
 
     springfoot study when learned learned-2 learned-3 --keep runs/when
+    springfoot study when learned learned-2 learned-3 --owner foot --aims fibre
 
 Four classes of stiffness, each within the next (`stiffness_classes`): constant, by phase, open loop, linear reflex. At
 each link the inner and the outer class go on with the same number of walks, by CMA-ES, from the best stiffness found
@@ -9,6 +10,10 @@ takes, of all that any search found in it or in a class within it, the stiffness
 search had. All four walk a test from further starts, and are compared episode by episode, neighbours and each with the
 constant class. There are two aims, each with its own searches: least fibre work a metre, and least distance from
 people. At last the reflex walks the same test with errors that reach it late.
+
+With the owner `foot` the stiffness is that of an adaptive right foot, whose constant class is a passive foot; the
+person sets that of the left one. The reflex is left out, and the foot's net work is compared too: what it gives more
+than it takes is not the person's.
 """
 
 from collections.abc import Mapping, Sequence
@@ -33,9 +38,9 @@ from springfoot.files.writing import csv_text
 from ..base.intervals import POWER
 from ..base.kept import Kept, known_as
 from ..base.study import Answer, OnProgress, WalkingStudy
-from .class_search import TEST_SEED, Candidate, Condition, PersonsSearch
-from .links import Aim, Link, Pair, compared, fewest_falls, links_table, verdict
-from .stiffness_classes import StiffnessClass, nested_classes, widened
+from .class_search import TEST_SEED, Candidate, Condition, Owner, PersonsSearch
+from .links import FOOT_WORK, Aim, Link, Pair, compared, fewest_falls, links_table, verdict
+from .stiffness_classes import StiffnessClass, classes_of_foot, nested_classes, widened
 
 REFLEX_DELAYS = (2, 4)
 """Steps of 20 ms by which a reflex is late; chosen: 40 and 80 ms."""
@@ -43,8 +48,15 @@ PHASES = np.arange(200) / 200
 """Stride phases of the picture and of its table."""
 EVERYONE = "all"
 """Person of the comparisons over all persons."""
+NOTES: dict[Owner, str] = {
+    "person": "The search for a reflex moves its gains alone. A reflex plus a network is left out. A late reflex is "
+    "the same one, whose errors are of 40 or 80 ms before.",
+    "foot": "The stiffness is that of an adaptive right foot, at rest at 0°; constant, it is a passive foot. Foot "
+    "work: net work of its ankle and toe in a stride, which is none of fibre work; above 0 the foot needs a battery.",
+}
+"""Owner of the stiffness -> sentences of the report."""
 LinkName = tuple[str, tuple[str, str], str]
-"""Aim, names of both classes, and condition in words."""
+"""Aim or `FOOT_WORK`, names of both classes, and condition in words."""
 WHOLE = slice(None)
 """All entries of a vector."""
 Found = tuple[str, str, StiffnessClass, NDArray]
@@ -69,6 +81,8 @@ class When(WalkingStudy):
     """Walks, pushed likewise, by which a class takes one of the stiffnesses found."""
     aims: tuple[Aim, ...] = get_args(Aim)
     """Aims of the searches: least fibre work, likeness, or both apart."""
+    owner: Owner = "person"
+    """Owner of the stiffness: both ankles and toes of the person, or an adaptive right foot."""
     pushes: tuple[float, ...] = (100.0, 200.0, 300.0)
     """Sizes of the pushes [N]; the searches have the first."""
     roughness: tuple[float, ...] = (0.01,)
@@ -107,7 +121,8 @@ class When(WalkingStudy):
         links = len(self._classes) - 1
         searches = [0, 0, 0] + [link for link in range(1, links) for _ in range(3)]  # the link of each
         searched = sum(map(self._generations_of, searches)) * self.population + (len(searches) + 1) * self.choosing
-        tested = (len(self._classes) + len(REFLEX_DELAYS)) * len(self._conditions) * self.episodes
+        late = len(REFLEX_DELAYS) if self._classes[-1].gains else 0
+        tested = (len(self._classes) + late) * len(self._conditions) * self.episodes
         return len(self.persons) * len(self.aims) * (searched + tested) * self.seconds
 
     def ask(self, progress: OnProgress) -> Answer:
@@ -125,6 +140,12 @@ class When(WalkingStudy):
             pairs = {name: pair for aim in self.aims for name, pair in self._test_links(search, aim, best[aim]).items()}
             if len(best) > 1:
                 pairs |= self._price_of_likeness(search, best)
+            if self.owner == "foot":
+                pairs |= {
+                    (FOOT_WORK, (f"{inner} for {aim}", f"{outer} for {aim}"), words): pair
+                    for (aim, (inner, outer), words), pair in pairs.items()
+                    if " for " not in inner
+                }
             for name, pair in pairs.items():
                 walks.setdefault(name, []).append(pair)
                 links.append(compared(person, *name, [pair]))
@@ -144,6 +165,7 @@ class When(WalkingStudy):
             folder.mkdir(parents=True, exist_ok=True)
         return PersonsSearch(
             person=person,
+            owner=self.owner,
             seconds=self.seconds,
             seed=self.seed,
             population=self.population,
@@ -193,13 +215,14 @@ class When(WalkingStudy):
         self, search: PersonsSearch, aim: str, best: Sequence[tuple[StiffnessClass, NDArray]]
     ) -> dict[LinkName, Pair]:
         """Return the test's numbers with both classes of each link, by its name: links between neighbours, between the
-        first class and each further one, and of the reflex and the same one late."""
-        reflex, gains = best[-1]
-        late = [
-            replace(reflex, name=f"{1000 * steps * ACTION_STEP:.0f} ms late", late=steps) for steps in REFLEX_DELAYS
-        ]
+        first class and each further one, and of a reflex and the same one late."""
+        last, vector = best[-1]
         links = [*pairwise(best), *((best[0], outer) for outer in best[2:])]
-        links += [((reflex, gains), (one, gains)) for one in late]
+        if last.gains:
+            late = [
+                replace(last, name=f"{1000 * steps * ACTION_STEP:.0f} ms late", late=steps) for steps in REFLEX_DELAYS
+            ]
+            links += [((last, vector), (one, vector)) for one in late]
         return {
             (aim, (inner[0].name, outer[0].name), condition.words): (
                 search.test_numbers(*inner, condition, self.episodes),
@@ -239,8 +262,11 @@ class When(WalkingStudy):
         seeds = f"seeds {self.seed + TEST_SEED}–{self.seed + TEST_SEED + self.episodes - 1}"
         return "\n\n".join(
             [
-                verdict(links),
-                *(f"**{aim}**\n\n{links_table([link for link in links if link.aim == aim])}" for aim in self.aims),
+                verdict([link for link in links if link.aim in self.aims]),
+                *(
+                    f"**{number}**\n\n{links_table([link for link in links if link.aim == number])}"
+                    for number in dict.fromkeys(link.aim for link in links)
+                ),
                 "![Stiffness of each class over the stride](stiffness.png)",
                 f"Persons: {', '.join(self.persons)}; {self.episodes} episodes × {self.seconds:g} s, {seeds}, of each "
                 "at every link and condition. Outer less inner class: undisturbed, paired, with its 95 % interval "
@@ -248,9 +274,8 @@ class When(WalkingStudy):
                 f"of inner, outer: episodes in which one alone falls show a difference {seen} (McNemar). Each search "
                 f"walks {' or '.join(str(self._generations_of(link)) for link in range(len(self._classes) - 1))} × "
                 f"{self.population} candidates, by link, pushed by ±{self.pushes[0]:g} N; {self.choosing} such walks "
-                "choose what a class takes. The search for a reflex moves its gains alone. A reflex plus a network is "
-                "left out. A late reflex is the same one, whose errors are of 40 or 80 ms before. A difference of "
-                "exactly 0: no search found better than the class within has, which says little of longer ones.",
+                f"choose what a class takes. {NOTES[self.owner]} A difference of exactly 0: no search found better "
+                "than the class within has, which says little of longer ones.",
             ]
         )
 
@@ -263,7 +288,7 @@ class When(WalkingStudy):
     @property
     def _classes(self) -> tuple[StiffnessClass, ...]:
         """Return the classes of stiffness for the default body, each within the next."""
-        return nested_classes(BipedSettings())
+        return {"person": nested_classes, "foot": classes_of_foot}[self.owner](BipedSettings())
 
 
 def _stiffness_csv(found: Sequence[Found]) -> str:

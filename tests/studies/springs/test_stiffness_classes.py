@@ -10,11 +10,20 @@ from springfoot.envs.batch import Biped
 from springfoot.envs.control import stiffness_of, stiffness_ranges
 from springfoot.envs.settings import BipedSettings, body_of
 from springfoot.envs.task import PERSON_OBSERVATION
-from springfoot.gait.springs.stiffness import thesis_schedule
-from springfoot.studies.springs.stiffness_classes import CENTRE, ERRORS, LONGEST_PART, nested_classes, widened
+from springfoot.evaluation.recording import policy_and_settings, record_feet
+from springfoot.gait.springs.stiffness import StiffnessSchedule, thesis_schedule
+from springfoot.studies.springs.stiffness_classes import (
+    CENTRE,
+    ERRORS,
+    LONGEST_PART,
+    classes_of_foot,
+    nested_classes,
+    widened,
+)
 
 SETTINGS = BipedSettings()
 CLASSES = nested_classes(SETTINGS)
+OF_FOOT = classes_of_foot(SETTINGS)
 NAMES = [entry.name for entry in PERSON_OBSERVATION]
 
 
@@ -110,3 +119,44 @@ def test_the_ankle_is_no_stiffer_than_its_tendon():
     constant, *_ = nested_classes(BipedSettings())
     assert constant.stiffness([9.0, 9.0], np.zeros(1)).tolist() == [[400.0, 200.0]]
     assert constant.stiffness([-9.0, -9.0], np.zeros(1)).tolist() == [[20.0, 5.0]]
+
+
+def test_the_ankle_of_a_foot_has_no_tendon():
+    constant, *_ = OF_FOOT
+    assert constant.stiffness([9.0, 9.0], np.zeros(1)).tolist() == [[1500.0, 200.0]]
+    assert constant.stiffness([-9.0, -9.0], np.zeros(1)).tolist() == [[150.0, 15.0]]
+
+
+@pytest.mark.parametrize(("inner", "outer"), list(pairwise(OF_FOOT)), ids=lambda one: one.name)
+def test_a_foot_of_an_outer_class_with_the_inner_ones_vector_has_the_same_springs(inner, outer):
+    phase = np.arange(500) / 500
+    vector = np.random.default_rng(1).normal(0.0, 0.4, inner.size)
+    within = widened(vector, inner, outer)
+
+    def springs(of_class, numbers):
+        """Return K and rest angles over the stride of the foot that settings make of a vector."""
+        foot = StiffnessSchedule.from_json(of_class.foot(numbers)["schedule"])
+        stiffness, rest = foot.at(phase)
+        assert stiffness.tolist() == of_class.stiffness(numbers, phase).tolist() and not rest.any()
+        return stiffness
+
+    assert springs(inner, vector).tobytes() == springs(outer, within).tobytes()
+    within[-1] += 0.5
+    assert (springs(outer, within) != springs(inner, vector)).any()
+
+
+def test_a_foot_of_constant_stiffness_is_a_passive_foot_to_the_bit():
+    constant, *_ = OF_FOOT
+    ankle, toe = constant.stiffness([0.3, 0.4], np.zeros(1))[0]
+    passive = {"kind": "passive", "ankle_stiffness": ankle, "toe_stiffness": toe, "ankle_deg": 0.0, "toe_deg": 0.0}
+    acting, settings = policy_and_settings("schedule", {"episode_seconds": 1.0})
+    feet = [{"right_foot": foot} for foot in (constant.foot([0.3, 0.4]), passive)]
+    varied, fixed = record_feet(acting, settings, feet, name="schedule", episodes=1)
+    assert varied.series["angle"].tobytes() == fixed.series["angle"].tobytes()
+
+
+def test_the_stiffness_of_a_foot_that_changes_in_the_air_is_one_from_heel_strike_to_toe_off():
+    _, in_the_air, per_phase, _ = OF_FOOT
+    stance = np.linspace(0.0, per_phase.ankle[-1] - 1e-9, 50)
+    found = in_the_air.stiffness([0.1, 0.5, -0.2, 0.3], np.append(stance, 0.9))
+    assert (found[:50] == found[0]).all() and (found[50] != found[0]).all()

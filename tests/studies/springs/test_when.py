@@ -139,3 +139,25 @@ def test_bad_flags_are_one_line(tmp_path, capsys):
     (tmp_path / "file").touch()
     assert study_main(["when", "--keep", str(tmp_path / "file")]) == 2
     assert "keep must be a folder" in capsys.readouterr().err
+
+
+def test_a_foot_that_varies_is_compared_with_a_passive_one_by_its_work_too(tmp_path):
+    words = ["when", "--owner", "foot", "--aims", "fibre", "--generations", "1", "--population", "2", "--episodes", "1"]
+    words += ["--choosing", "1", "--pushes", "100", "--roughness", "0.01", "--seconds", "5", "--threads", "1"]
+    assert study_main([*words, "--out", str(tmp_path / "out")]) == 0
+    rows = list(csv.DictReader((tmp_path / "out/links.csv").read_text().splitlines()))
+    level = [row for row in rows if row["condition"] == "undisturbed"]
+    assert [(row["aim"], row["inner"], row["outer"]) for row in level] == [
+        (aim, f"{inner}{suffix}", f"{outer}{suffix}")
+        for aim, suffix in (("fibre", ""), ("foot work", " for fibre"))
+        for inner, outer in (
+            ("constant", "in the air"),
+            ("in the air", "per phase"),
+            ("per phase", "open loop"),
+            ("constant", "per phase"),
+            ("constant", "open loop"),
+        )
+    ]
+    assert -0.5 < float(level[5]["inner_mean"]) < 0.0  # a passive foot gives back less than it takes
+    report = (tmp_path / "out/report.md").read_text()
+    assert "adaptive right foot" in report and "reflex" not in report
