@@ -186,6 +186,13 @@ def price(
     return cost, plan, effort
 
 
+def distances_deg(plan: WalkPlan, speed: float) -> NDArray:
+    """Return how far a plan's angles are from people's at `speed` [m/s], (3,), rms over the stride [deg], in the order
+    of `COMPARED_JOINTS`."""
+    joints = prediction_numbers(gait_of(plan), human_gait(speed))["joints"]
+    return np.array([joints[joint]["rmse_deg"] for joint in COMPARED_JOINTS])
+
+
 @dataclass(frozen=True, kw_only=True)
 class PlanTuning(Study):
     """Find the plans of least effort by CMA-ES, and write their styles into a file."""
@@ -213,6 +220,9 @@ class PlanTuning(Study):
     """Factor on the give of the Achilles tendon."""
     toe_tendon: float = 1.0
     """Factor on the give of the toes' tendons."""
+    likeness: float = 0.0
+    """Weight of the angles' mean squared distance from people's [1/deg^2], to tell how near to people plans of little
+    effort come; a prediction has none."""
     start: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = None
     """File of styles to begin at, in place of round numbers."""
     styles: Annotated[Path, tyro.conf.arg(metavar="FILE")] = STYLES
@@ -230,7 +240,7 @@ class PlanTuning(Study):
         for count, least in (("generations", 1), ("population", 4), ("seed", 0), ("processes", 1)):
             require_count(count, getattr(self, count), least)
         require_number("sigma", self.sigma, 0, above=True)
-        for name in ("tissue", "tendon", "toe_tendon"):
+        for name in ("tissue", "tendon", "toe_tendon", "likeness"):
             require_number(name, getattr(self, name), 0)
         for weight in self.weights:
             require_number("weights", weight, 0)
@@ -316,14 +326,13 @@ class PlanTuning(Study):
         """Return in words how far plans at `speed` [m/s] are from people, of candidates `near` the best, the first."""
         chosen = [near[k] for k in np.unique(np.linspace(0, len(near) - 1, MOST_NEAR).astype(int))]
         plans = [self._price(body, speed, self._vector_at(candidate, speed))[1] for candidate in chosen]
-        human = human_gait(speed)
-        numbers = [prediction_numbers(gait_of(plan), human)["joints"] for plan in plans if plan is not None]
-        ranges = []
-        for joint in COMPARED_JOINTS:
-            distances = [of_plan[joint]["rmse_deg"] for of_plan in numbers]
-            ranges.append(f"{joint} {min(distances):.1f} to {max(distances):.1f}°")
+        distances = np.array([distances_deg(plan, speed) for plan in plans if plan is not None])
+        ranges = [
+            f"{joint} {of_joint.min():.1f} to {of_joint.max():.1f}°"
+            for joint, of_joint in zip(COMPARED_JOINTS, distances.T, strict=True)
+        ]
         return (
-            f"{len(numbers)} of the {len(near)} plans that the search met within {NEARLY_LEAST - 1:.0%} of its least "
+            f"{len(distances)} of the {len(near)} plans that the search met within {NEARLY_LEAST - 1:.0%} of its least "
             f"cost are from people: {', '.join(ranges)}"
         )
 
@@ -336,8 +345,15 @@ class PlanTuning(Study):
         return ends[0] + (speed - slowest) / (fastest - slowest) * (ends[1] - ends[0])
 
     def _mean_price(self, body: Body, candidate: NDArray) -> float:
-        """Return the mean cost (`price`) of a candidate's plans over the flag `speeds`."""
-        return float(np.mean([self._price(body, speed, self._vector_at(candidate, speed))[0] for speed in self.speeds]))
+        """Return the mean over the flag `speeds` of a candidate's cost: that of `price`, and with `likeness` that of
+        the distance from people."""
+        costs = []
+        for speed in self.speeds:
+            cost, plan, _ = self._price(body, speed, self._vector_at(candidate, speed))
+            if self.likeness and plan is not None:
+                cost += self.likeness * float(np.mean(np.square(distances_deg(plan, speed))))
+            costs.append(cost)
+        return float(np.mean(costs))
 
     def _price(self, body: Body, speed: float, vector: NDArray) -> tuple[float, WalkPlan | None, Effort | None]:
         """Return cost, plan and effort of `price` at a vector, with the weights and muscles of the flags."""
