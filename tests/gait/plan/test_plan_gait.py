@@ -18,6 +18,7 @@ from springfoot.gait.plan.walk_style import STYLES, least_work, style_from
 from springfoot.studies.searches.plan_tuning import CHOICES, PlanTuning, price, style_at, vector_of
 
 PHASE = np.arange(200) / 200
+PERCENT = np.linspace(0.0, 1.0, 101)
 BODY = Body()
 PLAN = plan_walk(BODY, 1.2, style=least_work(1.2))
 
@@ -159,6 +160,22 @@ def test_a_search_at_another_step_time_prices_plans_of_that_step_time(tmp_path):
     vector = vector_of(least_work(1.2, styles))
     at_ratio = price(BODY, 1.2, vector, human=human_gait(1.2).paced(0.9))[0]
     assert f"1.2 m/s: paid {at_ratio:.2f}" in text and at_ratio != price(BODY, 1.2, vector)[0]
+
+
+def test_a_search_for_likeness_pays_for_the_squared_distance_from_people_beside_the_effort(tmp_path):
+    styles = tmp_path / "styles.json"
+    search = PlanTuning(likeness=0.5, generations=1, population=4, sigma=0.02, start=STYLES, styles=styles)
+    _, line = search.ask(lambda _: None).files["generations.csv"].splitlines()
+    effort, plan, _ = price(BODY, 1.2, vector_of(least_work(1.2, styles)))
+    assert plan is not None
+    distance = np.sqrt(
+        [
+            np.mean(np.degrees(gait_of(plan).mean(joint, PERCENT) - human_gait(1.2).mean(joint, PERCENT)) ** 2)
+            for joint in ("thigh", "knee", "ankle")
+        ]
+    )
+    assert float(line.split(",")[1]) == pytest.approx(effort + 0.5 * np.mean(distance**2), rel=1e-3)
+    assert distance.min() > 1.0
 
 
 @pytest.mark.parametrize(
