@@ -15,7 +15,7 @@ from typing import Annotated, Any, ClassVar
 import tyro
 
 from springfoot.agents.training import PRESETS, TrainingConfig, read_record
-from springfoot.errors import SpringfootError, require_count
+from springfoot.errors import SpringfootError, require_choice, require_count
 from springfoot.evaluation.numbers import measure
 from springfoot.evaluation.recording import record
 from springfoot.files.markdown import MISSING, table, text_of
@@ -54,6 +54,8 @@ class Specialists(WalkingStudy):
 
     persons: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="PERSON ...")] = ("learned",)
     """Policies that move the person: run folders, files, or those of the package, such as `learned`."""
+    cells: tuple[str, ...] = tuple(CELLS)
+    """Feet to train on with, by the names in the table."""
     timesteps: int = 2_000_000
     """Steps of each training."""
     training_seed: int = 0
@@ -68,6 +70,9 @@ class Specialists(WalkingStudy):
         """Refuse counts out of range."""
         super().check()
         require_count("timesteps", self.timesteps)
+        require_count("cells", len(self.cells))
+        for cell in self.cells:
+            require_choice("cells", cell, tuple(CELLS))
         require_count("training_seed", self.training_seed, 0, 2**31 - 1)
         if repeated := [name for name in self.persons if self.persons.count(name) > 1]:
             raise SpringfootError(f"{repeated[0]} is given {len(repeated)} times; give each person once")
@@ -99,7 +104,8 @@ class Specialists(WalkingStudy):
     @property
     def _cells(self) -> dict[str, Mapping[str, Any]]:
         """Return name -> feet of the cells that are walked."""
-        return dict(list(CELLS.items())[:QUICK_CELLS]) if self.quick else CELLS
+        cells = {name: CELLS[name] for name in self.cells}
+        return dict(list(cells.items())[:QUICK_CELLS]) if self.quick else cells
 
     @property
     def _folder(self) -> Path:
