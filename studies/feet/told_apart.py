@@ -20,7 +20,7 @@ from ..base.intervals import interval_of_persons
 
 GAIN = 0.10
 """Share of its price that a person may gain by further training on one sound, braced or rigid foot alone: on sound feet
-`learned-3` gained 9.6 % of effort (docs/results/csv/specialists.csv, rounded up; one training of each person)."""
+`learned-2` gained 10.0 % of effort (docs/results/csv/specialists.csv; one training of each person)."""
 GAIN_OF_KIND = {"weak": 0.22, **dict.fromkeys(("passive", "adaptive", "drop", "rigid_toe", "no_toe"), 0.11)}
 """The same of other kinds, by fibre work, used for both prices: `learned` alone gained 22 % with calves of 25 %, 11 %
 on a passive foot of 300 N m/rad (the same file). Kinds that were not measured are taken to be as passive ones."""
