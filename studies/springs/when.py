@@ -52,7 +52,8 @@ NOTES: dict[Owner, str] = {
     "person": "The search for a reflex moves its gains alone. A reflex plus a network is left out. A late reflex is "
     "the same one, whose errors are of 40 or 80 ms before.",
     "foot": "The stiffness is that of an adaptive right foot, at rest at 0°; constant, it is a passive foot. Foot "
-    "work: net work of its ankle and toe in a stride, which is none of fibre work; above 0 the foot needs a battery.",
+    "work: net work of its ankle and toe in a stride, which is none of fibre work; above 0 the foot gives more than it "
+    "takes.",
 }
 """Owner of the stiffness -> sentences of the report."""
 LinkName = tuple[str, tuple[str, str], str]
@@ -138,14 +139,13 @@ class When(WalkingStudy):
             }
             found += [(person, aim, *one) for aim, of_aim in best.items() for one in of_aim]
             pairs = {name: pair for aim in self.aims for name, pair in self._test_links(search, aim, best[aim]).items()}
-            if len(best) > 1:
-                pairs |= self._price_of_likeness(search, best)
             if self.owner == "foot":
                 pairs |= {
                     (FOOT_WORK, (f"{inner} for {aim}", f"{outer} for {aim}"), words): pair
                     for (aim, (inner, outer), words), pair in pairs.items()
-                    if " for " not in inner
                 }
+            if len(best) > 1:
+                pairs |= self._price_of_likeness(search, best)
             for name, pair in pairs.items():
                 walks.setdefault(name, []).append(pair)
                 links.append(compared(person, *name, [pair]))
