@@ -78,6 +78,10 @@ STUDIES = {
     "plan-tuning": ("searches.plan_tuning.PlanTuning", "Which plan of a walk costs least effort? (searches)"),
     "predict": ("searches.predict.Predict", "Which walk follows from body, plan and physics alone? (searches, trains)"),
     "controls": ("feet.controls.Controls", "Does the price of a walk hold where its answer is known?"),
+    "joint-prices": (
+        "feet.joint_prices.JointPrices",
+        "Which joint pays for a spring, and which for a missing ankle?",
+    ),
     "price": ("feet.price.Price", "How much does the price of a walk change with its tendons?"),
     "persons": ("feet.persons.Persons", "How do learned persons walk on drawn bodies and feet, and beside people?"),
     "foot-map": (

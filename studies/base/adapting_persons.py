@@ -1,5 +1,6 @@
 """Find policies that move a person: those that adapt to feet."""
 
+from collections.abc import Sequence
 from typing import Any
 
 from springfoot.agents.policies import PolicyFunction
@@ -19,3 +20,9 @@ def person_and_settings(name: str, given: dict[str, Any]) -> tuple[PolicyFunctio
     if settings.acts == "stiffness":
         raise SpringfootError(f"{name} moves no person: it was trained with acts 'stiffness'")
     return act, settings
+
+
+def require_each_once(persons: Sequence[str]) -> None:
+    """Raise `SpringfootError` for a person that is named more than once among `persons`."""
+    if repeated := [name for name in persons if persons.count(name) > 1]:
+        raise SpringfootError(f"{repeated[0]} is given {len(repeated)} times; give each person once")

@@ -26,9 +26,9 @@ from springfoot.files.markdown import MISSING, table, text_of
 from ..base.condition_walks import ConditionWalks
 from ..base.kept import Kept
 from ..base.study import Answer, OnProgress, WalkingStudy
+from ..base.walked_speeds import TWO_PRICES, Row, at_walked_speeds, lowest, price_numbers, rows_csv
 from .both_feet import both, braced
 from .told_apart import gain_words
-from .walked_speeds import TWO_PRICES, Row, at_walked_speeds, lowest, price_numbers, rows_csv
 
 ASKED_SPEEDS = (0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6)
 """Commanded speeds [m/s]."""
@@ -69,22 +69,24 @@ class Springs:
         return {k: f"{f'{k:g} N·m/rad' if k else 'slack'}, {self.name}" for k in self.settings}
 
 
+TWO_WAY = Springs(
+    name=f"both ankles, {DEVICE_KG:g} kg each",
+    against=f"slack, both ankles, {DEVICE_KG:g} kg each",  # like with like: the mass without a spring
+    settings={k: both(braced(ankle_stiffness=k) | WITH_MASS) for k in BOTH_ANKLES},
+)
+ONE_WAY = Springs(
+    name=f"both ankles, one-way, {DEVICE_KG:g} kg each",  # from the neutral ankle on, as a clutch does
+    against=f"slack, both ankles, one-way, {DEVICE_KG:g} kg each",
+    settings={k: both(braced(ankle_stiffness=k, engages="dorsiflexion") | WITH_MASS) for k in BOTH_ANKLES},
+)
 TRIED_SPRINGS = (
     Springs(
         name="both ankles",
         against=UNCHANGED,
         settings={k: both(braced(ankle_stiffness=k)) for k in BOTH_ANKLES},
     ),
-    Springs(
-        name=f"both ankles, {DEVICE_KG:g} kg each",
-        against=f"slack, both ankles, {DEVICE_KG:g} kg each",  # like with like: the mass without a spring
-        settings={k: both(braced(ankle_stiffness=k) | WITH_MASS) for k in BOTH_ANKLES},
-    ),
-    Springs(
-        name=f"both ankles, one-way, {DEVICE_KG:g} kg each",  # from the neutral ankle on, as a clutch does
-        against=f"slack, both ankles, one-way, {DEVICE_KG:g} kg each",
-        settings={k: both(braced(ankle_stiffness=k, engages="dorsiflexion") | WITH_MASS) for k in BOTH_ANKLES},
-    ),
+    TWO_WAY,
+    ONE_WAY,
 )
 """Springs with a best stiffness and a saving that are told."""
 CONTROLS: dict[str, Mapping[str, Any]] = {

@@ -24,9 +24,9 @@ from springfoot.files.markdown import MISSING, table
 
 from ..base.intervals import share_interval
 from ..base.study import Answer, OnProgress, WalkingStudy
+from ..base.walked_speeds import Row, rows_csv
 from .foot_numbers import numbers_of_feet
 from .spring_map import with_walked_speed
-from .walked_speeds import Row, rows_csv
 
 DROP_SPEEDS = (0.8, 1.2, 1.6)
 """Commanded speeds [m/s]."""

@@ -35,10 +35,10 @@ from springfoot.gait.plan import PLAN_SPEED_RANGE
 from ..base.adapting_persons import person_and_settings
 from ..base.flags import read_foot_flag
 from ..base.study import QUICK_NOTE, Answer, OnProgress, WalkingStudy
+from ..base.walked_speeds import TWO_PRICES, Row, rows_csv
 from .foot_numbers import numbers_of_feet
 from .orthosis import braced_calf
 from .told_apart import MOST_ALIKE, common_speed, comparison, difference, gain_of, gain_words, price_at, verdict
-from .walked_speeds import TWO_PRICES, Row, rows_csv
 
 MOST_FEET = 8
 """Feet that the colours of a report tell apart."""

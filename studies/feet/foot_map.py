@@ -28,9 +28,9 @@ from springfoot.files.markdown import MISSING, table, text_of
 
 from ..base.adapting_persons import person_and_settings
 from ..base.study import Answer, OnProgress, WalkingStudy
+from ..base.walked_speeds import Row, rows_csv
 from .foot_numbers import numbers_of_feet
 from .told_apart import gain_words
-from .walked_speeds import Row, rows_csv
 
 RightFoot = str | dict[str, Any]
 PASSIVE = [

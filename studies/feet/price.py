@@ -20,7 +20,7 @@ from springfoot.gait.body import ANKLE_TENDON
 from springfoot.gait.plan import AS_IS, Muscle, effort_of, least_work, plan_walk
 
 from ..base.study import Answer, OnProgress, WalkingStudy
-from .walked_speeds import TWO_PRICES, Row, rows_csv
+from ..base.walked_speeds import TWO_PRICES, Row, rows_csv
 
 FACTORS = (0.5, 1.0, 2.0)
 """Factors on each number."""

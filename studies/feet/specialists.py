@@ -15,17 +15,17 @@ from typing import Annotated, Any, ClassVar
 import tyro
 
 from springfoot.agents.training import PRESETS, TrainingConfig, read_record
-from springfoot.errors import SpringfootError, require_choice, require_count
+from springfoot.errors import require_choice, require_count
 from springfoot.evaluation.numbers import measure
 from springfoot.evaluation.recording import record
 from springfoot.files.markdown import MISSING, table, text_of
 from springfoot.files.writing import make_folder
 
-from ..base.adapting_persons import person_and_settings
+from ..base.adapting_persons import person_and_settings, require_each_once
 from ..base.study import Answer, OnProgress, WalkingStudy
 from ..base.trained import finish_training
+from ..base.walked_speeds import TWO_PRICES, Row, price_numbers, rows_csv
 from .both_feet import both, braced
-from .walked_speeds import TWO_PRICES, Row, price_numbers, rows_csv
 
 COLLINS_SPRING = 3.6 / radians(1.0)
 """Stiffness of springs at both ankles [N m/rad]: 3.6 N·m/deg, near that with which people took least energy (Collins et
@@ -74,8 +74,7 @@ class Specialists(WalkingStudy):
         for cell in self.cells:
             require_choice("cells", cell, tuple(CELLS))
         require_count("training_seed", self.training_seed, 0, 2**31 - 1)
-        if repeated := [name for name in self.persons if self.persons.count(name) > 1]:
-            raise SpringfootError(f"{repeated[0]} is given {len(repeated)} times; give each person once")
+        require_each_once(self.persons)
 
     @property
     def total(self) -> float:

@@ -22,9 +22,9 @@ from springfoot.files.markdown import MISSING, table
 
 from ..base.kept import Kept, known_as
 from ..base.study import Answer, OnProgress, PersonsStudy
+from ..base.walked_speeds import ASKED_SPEEDS, TWO_PRICES, WALKED_SPEEDS, Row, at_walked_speeds, lowest, rows_csv
 from .foot_numbers import FOOT_NUMBERS, numbers_of_feet
 from .told_apart import gain_words
-from .walked_speeds import ASKED_SPEEDS, TWO_PRICES, WALKED_SPEEDS, Row, at_walked_speeds, lowest, rows_csv
 
 COLORS = ("#0b6e8f", "#c26a1b", "#7a5195", "#4a8f3c", "#555555")
 

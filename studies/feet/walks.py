@@ -21,10 +21,10 @@ from springfoot.files.provenance import versions_and_commit
 
 from ..base.adapting_persons import person_and_settings
 from ..base.study import Answer, OnProgress, WalkingStudy, without_places
+from ..base.walked_speeds import rows_csv
 from .foot_choice import MOST_FEET, SIDES_OF, named_feet
 from .foot_numbers import FOOT_NUMBERS, numbers_of_feet
 from .orthosis import braced_calf
-from .walked_speeds import rows_csv
 
 PAGE_NAME = "walks.html"
 PAGE_FEET: Mapping[str, Mapping[str, Any]] = {

@@ -29,7 +29,7 @@ from springfoot.files.markdown import MISSING, table
 from ..base.columns import COMPARED_JOINTS
 from ..base.kept import Kept, known_as
 from ..base.study import Answer, OnProgress, PersonsStudy
-from ..feet.walked_speeds import ASKED_SPEEDS, TWO_PRICES, WALKED_SPEEDS, Row, at_walked_speeds, price_numbers, rows_csv
+from ..base.walked_speeds import ASKED_SPEEDS, TWO_PRICES, WALKED_SPEEDS, Row, at_walked_speeds, price_numbers, rows_csv
 
 ANKLES = (50.0, 100.0, 150.0, 200.0, 300.0, 400.0)
 """Stiffness of both ankles [N m/rad] for 1.70 m and 63 kg, up to the tendon's in series."""

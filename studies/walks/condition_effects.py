@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from springfoot.arrays import NDArray
 
-from ..feet.walked_speeds import Row
+from ..base.walked_speeds import Row
 
 Measured = Mapping[Any, Mapping[str, NDArray]]
 """Condition -> number -> its value in each of E episodes (E,), NaN where it is unknown."""

@@ -21,7 +21,7 @@ from ..base.adapting_persons import person_and_settings
 from ..base.condition_walks import ConditionWalks
 from ..base.kept import Kept
 from ..base.study import OnProgress, PersonsStudy
-from ..feet.walked_speeds import TWO_PRICES
+from ..base.walked_speeds import TWO_PRICES
 
 FIBRE, ALL_EFFORT = TWO_PRICES
 """Fibre work, and all of the effort as energy: its part of work is fibre work [J/kg/m] each."""

@@ -24,7 +24,7 @@ from springfoot.files.text_table import read_csv
 
 from ..base.intervals import LEAST_AGREEING, interval_of_persons, known_sign, of_persons
 from ..base.study import Answer, OnProgress, PersonsStudy
-from ..feet.walked_speeds import Row, at_walked_speeds, rows_csv
+from ..base.walked_speeds import Row, at_walked_speeds, rows_csv
 from .condition_effects import Measured, by_condition
 from .effect_experiments import EXPERIMENTS, Experiment
 from .effect_numbers import ALL_EFFORT, EFFECT_NUMBERS, FIBRE, episode_walks, walked_rows

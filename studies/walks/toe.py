@@ -20,9 +20,9 @@ from springfoot.files.markdown import MISSING, table, text_of
 
 from ..base.intervals import interval_of_persons, known_sign, of_persons, visible
 from ..base.study import Answer, OnProgress, PersonsStudy
+from ..base.walked_speeds import ASKED_SPEEDS, WALKED_SPEEDS, Row, at_walked_speeds, rows_csv
 from ..feet.both_feet import both, braced
 from ..feet.told_apart import gain_words
-from ..feet.walked_speeds import ASKED_SPEEDS, WALKED_SPEEDS, Row, at_walked_speeds, rows_csv
 from .condition_effects import Effect, Measured, by_condition, change, difference
 from .effect_experiments import LOCKED_TOE
 from .effect_numbers import EFFECT_NUMBERS, FIBRE, episode_walks, walked_rows

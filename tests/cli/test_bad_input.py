@@ -229,7 +229,7 @@ COMMANDS = [
     (["study", "bodies", "schedule", "--pairs", str(10**20)], 'springfoot study bodies: error: pairs must be a whole number >= 1 and <= 1000000000000, got 100000000000000000000'),
     (["study", "compare", "schedule", "--threads", "99999999999"], 'springfoot study compare: error: threads must be a whole number >= 1 and <= 1024, got 99999999999'),
     (["study", "compare", "schedule", "--seconds", "1e308"], 'springfoot study compare: error: seconds must be a finite number > 0 and <= 1e+09 s, got 1e+308'),
-    (["study", "a\x1b[31m"], "springfoot study: error: no study 'a\\x1b[31m'; there are compare, bodies, ablations, agreement, any-stiffness, identify, influence, learning-curves, leg-tuning, plan-tuning, predict, controls, price, persons, foot-map, specialists, landscape, effects, changes, toe, when, orthosis, prosthesis, drop-foot, walks"),
+    (["study", "a\x1b[31m"], "springfoot study: error: no study 'a\\x1b[31m'; there are compare, bodies, ablations, agreement, any-stiffness, identify, influence, learning-curves, leg-tuning, plan-tuning, predict, controls, joint-prices, price, persons, foot-map, specialists, landscape, effects, changes, toe, when, orthosis, prosthesis, drop-foot, walks"),
     (["a\x1b[31m"], "springfoot: error: no command 'a\\x1b[31m'; there are train, evaluate, live, feet, person, score, export, submit, judge, study, datasets, examples and completion"),
     (["export", "schedule", "--out", "a\x1b[31m"], 'springfoot export: error: out must end in .onnx, got a\\x1b[31m'),
 ]

@@ -3,6 +3,7 @@
 import pytest
 
 from springfoot.cli.main import study_main
+from springfoot.studies.base.walked_speeds import at_walked_speeds
 from springfoot.studies.feet.controls import (
     CONTROLS,
     STIFFEST,
@@ -13,7 +14,6 @@ from springfoot.studies.feet.controls import (
     best_table,
     controls_table,
 )
-from springfoot.studies.feet.walked_speeds import at_walked_speeds
 
 
 def priced(policy, condition, fibre, effort, falls=0.0):

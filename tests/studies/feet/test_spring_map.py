@@ -5,10 +5,10 @@ from collections.abc import Mapping
 import pytest
 
 from springfoot.cli.main import study_main
+from springfoot.studies.base.walked_speeds import at_walked_speeds
 from springfoot.studies.feet.orthosis import PER_DEG, Orthosis
 from springfoot.studies.feet.prosthesis import Prosthesis
 from springfoot.studies.feet.spring_map import best_springs, best_table, direction
-from springfoot.studies.feet.walked_speeds import at_walked_speeds
 
 
 def priced(prices: Mapping[float, float | None], case=0.3, speed=1.1, policy="one") -> list[dict]:

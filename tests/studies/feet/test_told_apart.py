@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from springfoot.envs.settings import settings_from
+from springfoot.studies.base.walked_speeds import TWO_PRICES
 from springfoot.studies.feet.specialists import CELLS
 from springfoot.studies.feet.told_apart import (
     GAIN,
@@ -23,7 +24,6 @@ from springfoot.studies.feet.told_apart import (
     verdict,
     without_price,
 )
-from springfoot.studies.feet.walked_speeds import TWO_PRICES
 
 CSV = Path(__file__).parents[3] / "docs" / "results" / "csv" / "specialists.csv"
 NOISE = 0.01 * np.random.default_rng(0).standard_normal((3, 8))

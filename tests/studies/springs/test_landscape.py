@@ -5,7 +5,7 @@ import json
 import pytest
 
 from springfoot.cli.main import study_main
-from springfoot.studies.feet.walked_speeds import TWO_PRICES
+from springfoot.studies.base.walked_speeds import TWO_PRICES
 from springfoot.studies.springs.landscape import (
     ANGLES_RMSE,
     ANKLES,
