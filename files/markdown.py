@@ -17,6 +17,12 @@ def text_of(value: float | None, pattern: str) -> str:
     return MISSING if value is None else format(value, pattern)
 
 
+def span_text(values: Sequence[float], pattern: str) -> str:
+    """Return the least and the largest of `values` as text such as "1 to 3", each by the format `pattern`; one number
+    if they read alike."""
+    return " to ".join(dict.fromkeys(format(value, pattern) for value in (min(values), max(values))))
+
+
 def plus_minus(spread: Mapping[str, float | None], pattern: str, *, alone: bool = True) -> str:
     """Return a dictionary {"mean", "sd"} as text "mean ± SD", each by the format `pattern`.
 

@@ -21,7 +21,7 @@ from springfoot.envs import BipedSettings
 from springfoot.envs.settings import body_of
 from springfoot.evaluation.numbers import measure
 from springfoot.evaluation.recording import Recording
-from springfoot.files.markdown import MISSING, table, text_of
+from springfoot.files.markdown import MISSING, span_text, table, text_of
 
 from ..base.condition_walks import ConditionWalks
 from ..base.kept import Kept
@@ -200,8 +200,7 @@ def _cell(pairs: Sequence[tuple[Row, Row]]) -> str:
     for price in TWO_PRICES:
         changes = [own[price] / sound[price] - 1.0 for own, sound in pairs]
         shown.append(text_of(float(np.mean([own[price] for own, _ in pairs])), ".2f"))
-        ends = list(dict.fromkeys(f"{change:+.0%}" for change in (min(changes), max(changes))))
-        differences.append(" to ".join(ends))
+        differences.append(span_text(changes, "+.0%"))
     return f"{' / '.join(shown)} ({' / '.join(differences)})"
 
 
@@ -250,8 +249,6 @@ def _span(rows: Sequence[Row]) -> str:
     least and the largest of each, a dash if a saving is None."""
     if any(row["saving"] is None for row in rows):
         return MISSING
-    ends = []
-    for column, form in (("best_N_m_rad", ".0f"), ("saving", ".0%")):
-        values = [row[column] for row in rows]
-        ends.append(" to ".join(dict.fromkeys(format(value, form) for value in (min(values), max(values)))))
-    return ", ".join(ends)
+    return ", ".join(
+        span_text([row[column] for row in rows], form) for column, form in (("best_N_m_rad", ".0f"), ("saving", ".0%"))
+    )

@@ -18,7 +18,7 @@ from springfoot.agents.training import PRESETS, TrainingConfig, read_record
 from springfoot.errors import require_choice, require_count
 from springfoot.evaluation.numbers import measure
 from springfoot.evaluation.recording import record
-from springfoot.files.markdown import MISSING, table, text_of
+from springfoot.files.markdown import MISSING, span_text, table
 from springfoot.files.writing import make_folder
 
 from ..base.adapting_persons import person_and_settings, require_each_once
@@ -177,8 +177,5 @@ def gap_table(rows: Sequence[Row]) -> str:
 
 def _over(rows: Sequence[Row], key: str, pattern: str) -> str:
     """Return the least and the largest number of a column over `rows`, one if they read alike; a dash without any."""
-    values = sorted(row[key] for row in rows if row[key] is not None)
-    if not values:
-        return MISSING
-    ends = dict.fromkeys(text_of(value, pattern) for value in (values[0], values[-1]))
-    return " to ".join(ends)
+    values = [row[key] for row in rows if row[key] is not None]
+    return span_text(values, pattern) if values else MISSING

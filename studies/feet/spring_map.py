@@ -4,7 +4,7 @@ A case is a calf's strength or a body's mass. Springs are compared where they wa
 same map under a policy that does not adapt (`beside`) tells how much of an answer is the person's.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import permutations
@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from springfoot.evaluation.numbers import measure
 from springfoot.evaluation.recording import policy_and_settings, record_feet
 from springfoot.evaluation.report import STYLE
-from springfoot.files.markdown import MISSING, table
+from springfoot.files.markdown import MISSING, span_text, table
 
 from ..base.kept import Kept, known_as
 from ..base.study import Answer, OnProgress, PersonsStudy
@@ -221,13 +221,9 @@ def _span(rows: Sequence[Row]) -> str:
     of `rows` of `best_springs`, a dash if one has no best spring."""
     if any(row["best"] is None for row in rows):
         return MISSING
-    return f"{_ends((row['best'] for row in rows), '.3g')} ({_ends((row['worst_more'] for row in rows), '+.0%')})"
-
-
-def _ends(values: Iterable[float], pattern: str) -> str:
-    """Return the least and the largest value, as in "150 to 250"; one number if both read alike."""
-    numbers = list(values)
-    return " to ".join(dict.fromkeys(format(value, pattern) for value in (min(numbers), max(numbers))))
+    return (
+        f"{span_text([row['best'] for row in rows], '.3g')} ({span_text([row['worst_more'] for row in rows], '+.0%')})"
+    )
 
 
 def direction(best: Sequence[Row], along: str) -> str:

@@ -30,8 +30,9 @@ from tqdm import tqdm
 
 from springfoot.arrays import NDArray
 from springfoot.errors import SpringfootError, quoted, require_count, require_number, require_within
+from springfoot.files.markdown import span_text
 from springfoot.files.writing import csv_text, write_atomically
-from springfoot.gait.body import HEEL_RADIUS, Body
+from springfoot.gait.body import GRAVITY, HEEL_RADIUS, Body
 from springfoot.gait.people import STEP_TIME_RATIO_RANGE, HumanGait, human_gait
 from springfoot.gait.plan import (
     AS_IS,
@@ -52,6 +53,7 @@ from springfoot.gait.plan import (
 
 from ..base.columns import COMPARED_JOINTS
 from ..base.study import Answer, OnProgress, Study
+from ..walks.changes import spans_table, stride_of_gait
 from .cma_search import asked_of, generations
 from .constants_file import read_styles
 from .prediction_table import prediction_numbers, prediction_table
@@ -107,7 +109,7 @@ PER_METRE_LOW, PER_UNIT = 200.0, 10.0
 """Cost of a swing foot that is too low [1/m], and of a choice outside its bounds, squared; chosen."""
 NEARLY_LEAST, MOST_NEAR = 1.1, 50
 """Cost over the least cost up to which a plan counts as nearly as good, and how many of those that a search meets are
-held against people; chosen. The range of their distances from people tells how much least effort leaves open."""
+held against people; chosen. The spread of their numbers tells how much least effort leaves open."""
 IMPOSSIBLE = 30.0
 """Cost of an impossible plan, to which the distance of its choices from the start is added; chosen."""
 
@@ -311,30 +313,41 @@ class PlanTuning(Study):
             cost, plan, effort = self._price(body, speed, self._vector_at(best, speed))
             parts.append(f"{speed:g} m/s: paid {cost:.4f}: {effort}")
             if plan is not None:
-                human = human_gait(speed)
-                columns = {
-                    "people": prediction_numbers(human, human),
-                    "the plan": prediction_numbers(gait_of(plan), human),
-                }
-                parts.append(prediction_table(columns, ("the plan",)))
-                parts.append(self._likeness_of(near, body, speed))
+                parts.append(self._beside_people(plan, near, body, speed))
+        if len(self.found_speeds) > 1:
+            parts.append(self._changes(near, body))
         return Answer(
             text="\n\n".join(parts), files={"generations.csv": csv_text(["generation", "best", "median"], lines)}
         )
 
-    def _likeness_of(self, near: Sequence[NDArray], body: Body, speed: float) -> str:
-        """Return in words how far plans at `speed` [m/s] are from people, of candidates `near` the best, the first."""
-        chosen = [near[k] for k in np.unique(np.linspace(0, len(near) - 1, MOST_NEAR).astype(int))]
-        plans = [self._price(body, speed, self._vector_at(candidate, speed))[1] for candidate in chosen]
-        distances = np.array([distances_deg(plan, speed) for plan in plans if plan is not None])
-        ranges = [
-            f"{joint} {of_joint.min():.1f} to {of_joint.max():.1f}°"
-            for joint, of_joint in zip(COMPARED_JOINTS, distances.T, strict=True)
-        ]
+    def _beside_people(self, plan: WalkPlan, near: Sequence[NDArray], body: Body, speed: float) -> str:
+        """Return the table of people and the best `plan` at `speed` [m/s], and of the spread of the candidates `near`
+        it, the first."""
+        human = human_gait(speed)
+        plans, efforts = zip(*self._plans_of(near, body, speed), strict=True)
+        people, best, *numbers = (prediction_numbers(gait, human) for gait in (human, *map(gait_of, (plan, *plans))))
+        spans = {f"plans within {NEARLY_LEAST - 1:.0%} of its cost": numbers}
+        text = prediction_table({"people": people, "the plan": best}, ("the plan",), spans)
+        works = [effort.work * GRAVITY for effort in efforts]
         return (
-            f"{len(distances)} of the {len(near)} plans that the search met within {NEARLY_LEAST - 1:.0%} of its least "
-            f"cost are from people: {', '.join(ranges)}"
+            f"{text}\n\nThe spread is that of {len(plans)} of {len(near)} plans, which take {span_text(works, '.2f')} "
+            "J/kg/m of fibre work."
         )
+
+    def _changes(self, near: Sequence[NDArray], body: Body) -> str:
+        """Return the table of the changes from the first to the last speed: of people, the best plan, and the
+        candidates `near` it, the first."""
+        ends = [[stride_of_gait(gait_of(plan)) for plan, _ in self._plans_of(near, body, v)] for v in self.found_speeds]
+        people = [stride_of_gait(human_gait(speed)) for speed in self.found_speeds]
+        slowest, fastest = self.found_speeds
+        return f"{spans_table(people, [*zip(*ends, strict=True)])}\n\nChanges from {slowest:g} to {fastest:g} m/s."
+
+    def _plans_of(self, near: Sequence[NDArray], body: Body, speed: float) -> list[tuple[WalkPlan, Effort]]:
+        """Return plan and effort at `speed` [m/s] of at most `MOST_NEAR` of the candidates `near` the best, the first
+        among them; `near` ascends by cost."""
+        chosen = [near[k] for k in np.unique(np.linspace(0, len(near) - 1, MOST_NEAR).astype(int))]
+        priced = [self._price(body, speed, self._vector_at(candidate, speed))[1:] for candidate in chosen]
+        return [(plan, effort) for plan, effort in priced if plan is not None and effort is not None]
 
     def _vector_at(self, candidate: NDArray, speed: float) -> NDArray:
         """Return the vector of a candidate's style at `speed` [m/s], linear between its vectors at `found_speeds`."""

@@ -8,7 +8,7 @@ import numpy as np
 from springfoot.envs.control import reference_walk_at
 from springfoot.envs.settings import BipedSettings, reference_gait
 from springfoot.evaluation.numbers import NO_FALLS, Criterion, with_derived
-from springfoot.files.markdown import MISSING, table
+from springfoot.files.markdown import MISSING, span_text, table
 from springfoot.gait.body import GRAVITY
 from springfoot.gait.people import PERCENT, HumanGait, correlation, force_features, rmse, stride_work
 
@@ -72,11 +72,17 @@ def people_numbers(settings: BipedSettings) -> dict[str, Any]:
     return prediction_numbers(human, human)
 
 
-def prediction_table(columns: Mapping[str, Mapping[str, Any]], judged: Sequence[str]) -> str:
-    """Return the Markdown table of `PREDICTION`: a column for each entry of `columns` (head -> numbers).
+def prediction_table(
+    columns: Mapping[str, Mapping[str, Any]],
+    judged: Sequence[str],
+    spans: Mapping[str, Sequence[Mapping[str, Any]]] | None = None,
+) -> str:
+    """Return the Markdown table of `PREDICTION`: a column for each entry of `columns` (head -> numbers), then one for
+    each of `spans` (head -> numbers of several walks), with the least and the largest.
 
     In the `judged` columns missed numbers are bold, and the last line counts them.
     """
+    spans = spans or {}
     lines = []
     for criterion in PREDICTION:
         cells = []
@@ -84,13 +90,21 @@ def prediction_table(columns: Mapping[str, Mapping[str, Any]], judged: Sequence[
             value = _value(criterion, values)
             text = MISSING if value is None else format(value, criterion.pattern)
             cells.append(f"**{text}**" if name in judged and not _holds(criterion, values) else text)
+        cells += [_span(criterion, walks) for walks in spans.values()]
         lines.append([criterion.name, criterion.text, *cells])
     missed = [
         str(sum(not _holds(criterion, values) for criterion in PREDICTION)) if name in judged else ""
         for name, values in columns.items()
     ]
-    lines.append(["missed", f"of {len(PREDICTION)}", *missed])
-    return table(["", "wanted", *columns], lines)
+    lines.append(["missed", f"of {len(PREDICTION)}", *missed, *[""] * len(spans)])
+    return table(["", "wanted", *columns, *spans], lines)
+
+
+def _span(criterion: Criterion, walks: Sequence[Mapping[str, Any]]) -> str:
+    """Return a criterion's least and largest number in `walks` as a cell; a dash if one does not have it."""
+    values = [_value(criterion, walk) for walk in walks]
+    known = [value for value in values if value is not None]
+    return span_text(known, criterion.pattern) if known and len(known) == len(values) else MISSING
 
 
 def _value(criterion: Criterion, values: Mapping[str, Any]) -> float | None:

@@ -22,7 +22,7 @@ from springfoot.envs.settings import BipedSettings
 from springfoot.errors import SpringfootError, require_within
 from springfoot.evaluation.numbers import Gait, measure
 from springfoot.evaluation.recording import policy_and_settings, record
-from springfoot.files.markdown import MISSING, table, text_of
+from springfoot.files.markdown import MISSING, span_text, table, text_of
 from springfoot.files.writing import csv_text
 from springfoot.gait.people import COLUMNS, PERCENT, HumanGait, correlation, human_gait, rmse
 from springfoot.gait.plan import PLAN_SPEED_RANGE
@@ -259,6 +259,26 @@ def numbers_table(people: Sequence[Stride], walks: Mapping[str, Sequence[Stride]
     lines.append([f"sign right, of {judged}", MISSING, *(str(count) for count in right.values())])
     lines.append([f"size within {WITHIN:g}, of {judged}", MISSING, *(str(count) for count in alike.values())])
     return table(["change", "people ± SD", *walks], lines)
+
+
+def spans_table(people: Sequence[Stride], walks: Sequence[Sequence[Stride]]) -> str:
+    """Return the Markdown table of the changes of several walks that are one answer: the first, and the least and the
+    largest of all.
+
+    It has the errors of `curves_table` and the changes of `QUANTITIES`; `people` and each of `walks` are the strides at
+    the two speeds.
+    """
+    lines = []
+    for joint in COMPARED_JOINTS:
+        change = people[1].curves[joint] - people[0].curves[joint]
+        errors = [rmse(walk[1].curves[joint] - walk[0].curves[joint], change) or 0.0 for walk in walks]
+        nothing = f"{text_of(rmse(change, 0.0 * change), '.1f')}, if nothing changes"
+        lines.append([f"error of the {joint}'s change [°]", nothing, f"{errors[0]:.1f}", span_text(errors, ".1f")])
+    for quantity in QUANTITIES:
+        change, spread = _changes(people, quantity)
+        own = [_changes(walk, quantity)[0] for walk in walks]
+        lines.append([quantity.label, f"{change:+.2f} ± {spread:.2f}", f"{own[0]:+.2f}", span_text(own, "+.2f")])
+    return table(["change", "people ± SD", "the first", f"all {len(walks)}"], lines)
 
 
 def changes_csv(people: Sequence[Stride], walks: Mapping[str, Sequence[Stride]]) -> str:

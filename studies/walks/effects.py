@@ -19,7 +19,7 @@ import tyro
 
 from springfoot.arrays import NDArray
 from springfoot.errors import SpringfootError, perhaps
-from springfoot.files.markdown import MISSING, table
+from springfoot.files.markdown import MISSING, span_text, table
 from springfoot.files.text_table import read_csv
 
 from ..base.intervals import LEAST_AGREEING, interval_of_persons, known_sign, of_persons
@@ -225,7 +225,7 @@ def _walked_speed_range(measured: Iterable[Measured]) -> str:
     without any. `measured` has an entry for each person."""
     of_conditions = [_finite_values(numbers["walked_m_s"]) for of_person in measured for numbers in of_person.values()]
     speeds = [float(np.mean(of_episodes)) for of_episodes in of_conditions if len(of_episodes)]
-    return " to ".join(dict.fromkeys(f"{end:.2f}" for end in (min(speeds), max(speeds)))) if speeds else MISSING
+    return span_text(speeds, ".2f") if speeds else MISSING
 
 
 def _conditions_without_numbers(measured: Iterable[Measured], walks: Iterable[Sequence[Row]]) -> list[str]:

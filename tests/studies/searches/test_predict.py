@@ -107,6 +107,15 @@ def test_the_table_has_people_in_range_and_bold_where_a_walk_is_not():
         assert people == "0.0" or "RMSE" not in name
 
 
+def test_a_spread_has_the_least_and_the_largest_of_its_walks():
+    people = people_numbers(BipedSettings(guide="plan"))
+    other = people | {"cost_of_transport": 0.25}
+    lines = prediction_table({"people": people}, (), {"several": [other, people, people]}).splitlines()
+    last = {line.split(" | ")[0].strip("| "): line.split(" | ")[-1].strip("| ") for line in lines}
+    assert last["cost of transport"] == f"{people['cost_of_transport']:.3f} to 0.250"
+    assert last["thigh: RMSE [°]"] == "0.0" and last["falls"] == "–" and last["missed"] == ""
+
+
 def test_a_plan_file_takes_the_place_of_the_packages_own_and_another_kind_is_refused(tmp_path):
     path, styles = tmp_path / "found.json", json.loads(STYLES.read_text(encoding="utf-8"))["styles"]
     path.write_text(json.dumps({"styles": styles}), encoding="utf-8")

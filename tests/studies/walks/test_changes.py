@@ -14,6 +14,7 @@ from springfoot.studies.walks.changes import (
     negative_work,
     numbers_table,
     positive_work,
+    spans_table,
     stride_of_gait,
 )
 
@@ -47,6 +48,16 @@ def test_people_change_as_people_and_what_stays_changes_nothing():
         head, _, people, still = line(numbers, begin)
         judged = int(head.rpartition(" ")[2])
         assert judged == int(people) > 5 and int(still) == 0
+
+
+def test_the_spread_of_several_walks_is_from_the_least_to_the_largest_change():
+    still = (PEOPLE[0], PEOPLE[0])
+    table = spans_table(PEOPLE, [still, tuple(PEOPLE)])
+    (own,) = curves_table(PEOPLE, {"still": still}).splitlines()[3:]
+    error = own.split(" | ")[1].split(" ")[0]  # of the thigh
+    assert line(table, "error of the thigh's")[1:] == [f"{error}, if nothing changes", error, f"0.0 to {error}"]
+    _, people, first, both = line(table, "range of the thigh")
+    assert first == "+0.00" and both == f"+0.00 to {people.split(' ')[0]}"
 
 
 def test_speeds_ascend():
