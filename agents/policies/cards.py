@@ -26,7 +26,7 @@ MADE = {
         name: (
             "Moves hips, knees and ankles too, on any foot, body, speed, step time and slope that it drew.",
             f"`springfoot train --preset person --seed {LEARNED[name].rpartition('-')[2]}`, its last policy",
-            "feet",
+            "persons",
         )
         for name in SHIPPED
         if name.startswith("learned")
