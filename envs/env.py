@@ -63,6 +63,7 @@ class SegmentedFootBiped(Face, gym.Env[NDArray, NDArray]):  # pyright: ignore[re
     |           |                                  |                          | `damping_time` [s], or torque-angle    |
     |           |                                  |                          | lines `ankle_table`, `toe_table`       |
     | adaptive  | the action's, fixed rest angle   | likewise                 | `ankle_deg`, `toe_deg`, or `schedule`  |
+    |           |                                  |                          | with `damping_time`                    |
     | weak      | the action's, weak plantarflexor | the action's             | `strength` [0.1..0.6]                  |
     | drop      | the action's, slack in swing     | the action's             |                                        |
 

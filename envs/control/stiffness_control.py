@@ -281,6 +281,19 @@ def move(rows, bodies, control, rest, incline, feet, options, walking) -> None:
 
 
 @kernel
+def _begin_devices(rows, feet, ids) -> None:
+    """Set the K of devices in the bodies `ids` (K,) as an episode begins: constant, or of the schedule at the leg's
+    phase; 0 of a torque-angle line, as no angle is known yet. `rows` and `feet` are as for `device`."""
+    for i in ids:
+        for side in range(2):
+            for joint in range(2):
+                stiffness = 0.0
+                if rows[i].feet.line[side, joint] < 0:
+                    stiffness, _ = device(rows[i], feet, 0.0, side, joint)
+                rows[i].springs.device[side, joint] = stiffness
+
+
+@kernel
 def _hold(rows, bodies, control, feet, standing):
     """Let the muscles of standing bodies take over the K and K theta_eq that `envs.control.standing` has set.
 
@@ -397,6 +410,7 @@ class FootSprings:
         self._springs["fresh"][ids] = 1
         self._springs["delay"][ids] = delay
         self._springs["taut"][ids] = 1.0
+        _begin_devices(self._subjects.rows, self.feet, np.asarray(ids))
 
     def scheduled(self, leg_phase: NDArray) -> NDArray:
         """Return the schedule's K of ankle and toe (N, side, 2) [N m/rad] at the phases `leg_phase` (N, side)."""

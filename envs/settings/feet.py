@@ -80,7 +80,7 @@ KINDS: dict[str, dict[str, Number]] = {
     "rigid_toe": {},
     "no_toe": {},
     "passive": SPRING_NUMBERS,
-    "adaptive": {name: SPRING_NUMBERS[name] for name in ("ankle_deg", "toe_deg")},
+    "adaptive": {name: SPRING_NUMBERS[name] for name in ("ankle_deg", "toe_deg", "damping_time")},
     "weak": {"strength": Number(0.3, 0.1, 0.6, "(of the sound leg)")},
     "drop": {},
 }
@@ -170,14 +170,15 @@ def _checked_foot(name: str, value: Any) -> str | dict[str, Any]:
     plain |= _checked_numbers(name, f"a foot of kind {kind!r}", given, KINDS[kind] | SEGMENT_RATIOS, further)
     for key in replacements:
         if value.get(key) is not None:
-            joint = key.partition("_")[0]  # of "ankle_table"; a schedule is of both joints
-            replaced = [other for other in plain if key == "schedule" or other.startswith(joint)]
-            if both := [other for other in replaced if other in KINDS[kind]]:
+            joints = SPRINGS if key == "schedule" else (key.partition("_")[0],)  # of "ankle_table"
+            if both := [other for other in plain if other in KINDS[kind] and other.startswith(joints)]:
                 raise SpringfootError(f"{name}: give {key} or {both[0]}, not both")
             if key == "schedule":
                 plain[key] = _checked_schedule(name, value[key])
             else:
                 plain[key] = _checked_table(f"{name}: {key}", value[key])
+    if kind == "adaptive" and "damping_time" in plain and "schedule" not in plain:
+        raise SpringfootError(f"{name}: damping_time of an adaptive foot needs its schedule; else it is the muscles'")
     if (orthosis := value.get("orthosis")) is not None:
         plain["orthosis"] = _checked_orthosis(f"{name}: orthosis", orthosis)
     return kind if len(plain) == 1 else plain  # a word where the kind says all
@@ -304,8 +305,9 @@ def _foot_of(kind: str, given: Mapping[str, Any]) -> Foot:
             ankle = FootJoint(device=ankle_spring, orthosis=of_ankle)
             toe = FootJoint(device=toe_spring, orthosis=of_toe)
         case "adaptive" if "schedule" in given:  # its K and rest angles replace those of these springs
-            ankle = FootJoint(device=Spring(), orthosis=of_ankle)
-            toe = FootJoint(device=Spring(), orthosis=of_toe)
+            spring = Spring(damping_time=value["damping_time"])
+            ankle = FootJoint(device=spring, orthosis=of_ankle)
+            toe = FootJoint(device=spring, orthosis=of_toe)
         case "adaptive":
             ankle = FootJoint(rest=radians(value["ankle_deg"]), orthosis=of_ankle)
             toe = FootJoint(rest=radians(value["toe_deg"]), orthosis=of_toe)

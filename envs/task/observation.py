@@ -65,13 +65,13 @@ def units_of(body: Body) -> NDArray:
 def _stiffness_entry(row, control, side, joint) -> float:
     """Return the natural logarithm of K over its unit (`SCALES`) at one ankle or toe, muscles and device together [-].
 
-    Before an episode's first step no K of muscles is set, and the entry is 0 but for devices of constant K. `row` is
-    of `TASK_ROW`, `control` of `CONTROL_ROW`; `side` is 0 left, 1 right, `joint` 0 ankle, 1 toe.
+    Before an episode's first step no K of muscles is set, nor that of a torque-angle line, and the entry is 0. `row`
+    is of `TASK_ROW`, `control` of `CONTROL_ROW`; `side` is 0 left, 1 right, `joint` 0 ankle, 1 toe.
     """
     springs = control.springs
     stiffness = muscle_stiffness(springs, side, joint) + springs.device[side, joint]
     if springs.fresh:
-        of_device = control.feet.stiffness[side, joint]
+        of_device = springs.device[side, joint]
         stiffness = of_device if of_device > 0.0 else row.scales.stiffness_unit[joint]
     return log(max(stiffness / row.scales.stiffness_unit[joint], _SOFTEST))
 

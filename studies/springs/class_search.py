@@ -28,7 +28,7 @@ from ..base.columns import COMPARED_JOINTS
 from ..base.kept import Kept, known_as
 from ..base.study import OnProgress
 from ..searches.cma_search import generations
-from .links import FOOT_WORK, UNDISTURBED_WALK, UNIT_OF_NUMBER
+from .links import BESIDE_AIM, UNDISTURBED_WALK, UNIT_OF_NUMBER
 from .stiffness_classes import StiffnessClass
 
 FALL_COST = 4.0
@@ -75,6 +75,8 @@ class PersonsSearch:
     """Policy that moves the person, and beside an adaptive foot sets the other foot's stiffness."""
     owner: Owner
     """Owner of the stiffness."""
+    damping_time: float | None
+    """Damping over stiffness of an adaptive foot's springs [s]; None for that of muscles."""
     seconds: float
     """Length of each episode."""
     seed: int
@@ -176,7 +178,7 @@ class PersonsSearch:
         if self.owner == "foot":
             given = {"episode_seconds": self.seconds, **condition._asdict()}
             acting, settings = policy_and_settings(self.person, given)
-            feet = [{"right_foot": of_class.foot(vector)} for vector in vectors]
+            feet = [{"right_foot": of_class.foot(vector, self.damping_time)} for vector in vectors]
             how: dict[str, Any] = {"threads": self.threads, "progress": self.progress}
             return record_feet(acting, settings, feet, name=of_class.name, episodes=episodes, seed=seed, **how)
         person = str(find_policy(self.person))
@@ -202,7 +204,7 @@ class PersonsSearch:
     @property
     def _in_question(self) -> list[Any]:
         """Return the parts of every question, on which all costs and numbers depend."""
-        owner = [] if self.owner == "person" else [self.owner]
+        owner = [] if self.owner == "person" else [self.owner, self.damping_time]
         return [known_as(self.person), self.seconds, self.seed, self.population, self.push_newton, *owner]
 
 
@@ -216,8 +218,8 @@ def _batch(person: str, seconds: float, condition: Condition, count: int, thread
 
 
 def aim_numbers(recording: Recording) -> dict[str, Any]:
-    """Return speed, the number of each `Aim` and, on unlike feet, `FOOT_WORK` of a recording, from its metrics; None of
-    all if one is missing."""
+    """Return speed, the number of each `Aim` and, on unlike feet, those of `BESIDE_AIM` of a recording, from its
+    metrics; None of all if one is missing."""
     metrics = measure(recording).metrics
     angles = [metrics["joints"][joint]["rmse_deg"] for joint in COMPARED_JOINTS]
     fibre = metrics["effort"]["fibre_J_kg_m"]
@@ -228,5 +230,6 @@ def aim_numbers(recording: Recording) -> dict[str, Any]:
         return {"speed_m_s": None, **dict.fromkeys(UNIT_OF_NUMBER)}
     numbers = {"speed_m_s": speed, "fibre": fibre, "likeness": float(np.mean(angles))}
     if work:
-        numbers[FOOT_WORK] = sum(joint["positive"] - joint["negative"] for joint in work)
+        given, taken = (sum(joint[part] for joint in work) for part in ("positive", "negative"))
+        numbers |= zip(BESIDE_AIM, (metrics["effort"]["total"], given - taken, taken), strict=True)
     return numbers

@@ -18,8 +18,17 @@ Aim = Literal["fibre", "likeness"]
 """Aim of a search: least fibre work a metre; least mean over joints of the angles' rms from people's mean."""
 FOOT_WORK = "foot work"
 """Net work of an adaptive right foot's ankle and toe in a stride, > 0 where it gives more than it takes."""
-UNIT_OF_NUMBER: dict[str, str] = dict(zip((*get_args(Aim), FOOT_WORK), ("J/kg/m", "°", "J/kg"), strict=True))
-"""Aim, or `FOOT_WORK` -> unit of its number."""
+FOOT_TAKES = "foot takes"
+"""Work that the same foot takes in a stride, the negative part."""
+EFFORT = "effort"
+"""All of the effort (`springfoot.gait.plan.Effort.total`)."""
+BESIDE_AIM = (EFFORT, FOOT_WORK, FOOT_TAKES)
+"""Numbers that are compared beside the aim where an adaptive foot has the stiffness."""
+UNIT_OF_NUMBER: dict[str, str] = {
+    **dict(zip(get_args(Aim), ("J/kg/m", "°"), strict=True)),
+    **dict(zip(BESIDE_AIM, ("-", "J/kg", "J/kg"), strict=True)),
+}
+"""Aim, or one of `BESIDE_AIM` -> unit of its number."""
 UNDISTURBED_WALK = "undisturbed"
 """Condition without pushes, on even ground, in words."""
 

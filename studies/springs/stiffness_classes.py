@@ -107,14 +107,15 @@ class StiffnessClass:
         parts = np.stack([ankle[_part_index(self.ankle, phase)], toe[_part_index(self.toe, phase)]], -1)
         return np.clip(np.array(CENTRE) * np.exp(parts), *np.transpose(self.ranges))
 
-    def foot(self, vector: ArrayLike) -> dict[str, Any]:
+    def foot(self, vector: ArrayLike, damping_time: float | None = None) -> dict[str, Any]:
         """Return the setting of an adaptive foot with the stiffness of one vector, on any body, at rest at
-        `FOOT_REST`."""
+        `FOOT_REST`; `damping_time` [s] is damping over stiffness, None for that of muscles."""
         ankle, toe = (
             [[start, float(self.stiffness(vector, np.array([start]))[0, joint]), FOOT_REST] for start in starts]
             for joint, starts in enumerate((self.ankle, self.toe))
         )
-        return {"kind": "adaptive", "schedule": {"ankle": ankle, "toe": toe}}
+        damping = {} if damping_time is None else {"damping_time": damping_time}
+        return {"kind": "adaptive", "schedule": {"ankle": ankle, "toe": toe}, **damping}
 
 
 def widened(vector: ArrayLike, inner: StiffnessClass, outer: StiffnessClass) -> NDArray:

@@ -12,8 +12,8 @@ constant class. There are two aims, each with its own searches: least fibre work
 people. At last the reflex walks the same test with errors that reach it late.
 
 With the owner `foot` the stiffness is that of an adaptive right foot, whose constant class is a passive foot; the
-person sets that of the left one. The reflex is left out, and the foot's net work is compared too: what it gives more
-than it takes is not the person's.
+person sets that of the left one. The reflex is left out, and effort and the foot's work are compared too: what it
+gives more than it takes is not the person's.
 """
 
 from collections.abc import Mapping, Sequence
@@ -30,7 +30,7 @@ from matplotlib.figure import Figure
 
 from springfoot.arrays import NDArray
 from springfoot.envs.physics import ACTION_STEP
-from springfoot.envs.settings import BipedSettings
+from springfoot.envs.settings import SPRING_NUMBERS, BipedSettings
 from springfoot.errors import MOST_COUNT, SpringfootError, require_count, require_number
 from springfoot.evaluation.report import STYLE
 from springfoot.files.writing import csv_text
@@ -39,7 +39,7 @@ from ..base.intervals import POWER
 from ..base.kept import Kept, known_as
 from ..base.study import Answer, OnProgress, WalkingStudy
 from .class_search import TEST_SEED, Candidate, Condition, Owner, PersonsSearch
-from .links import FOOT_WORK, Aim, Link, Pair, compared, fewest_falls, links_table, verdict
+from .links import BESIDE_AIM, Aim, Link, Pair, compared, fewest_falls, links_table, verdict
 from .stiffness_classes import StiffnessClass, classes_of_foot, nested_classes, widened
 
 REFLEX_DELAYS = (2, 4)
@@ -53,11 +53,11 @@ NOTES: dict[Owner, str] = {
     "the same one, whose errors are of 40 or 80 ms before.",
     "foot": "The stiffness is that of an adaptive right foot, at rest at 0°; constant, it is a passive foot. Foot "
     "work: net work of its ankle and toe in a stride, which is none of fibre work; above 0 the foot gives more than it "
-    "takes.",
+    "takes. Foot takes: the part of it that is negative.",
 }
 """Owner of the stiffness -> sentences of the report."""
 LinkName = tuple[str, tuple[str, str], str]
-"""Aim or `FOOT_WORK`, names of both classes, and condition in words."""
+"""Aim or one of `BESIDE_AIM`, names of both classes, and condition in words."""
 WHOLE = slice(None)
 """All entries of a vector."""
 Found = tuple[str, str, StiffnessClass, NDArray]
@@ -84,6 +84,9 @@ class When(WalkingStudy):
     """Aims of the searches: least fibre work, likeness, or both apart."""
     owner: Owner = "person"
     """Owner of the stiffness: both ankles and toes of the person, or an adaptive right foot."""
+    damping_time: float | None = None
+    """Damping over stiffness of an adaptive foot's springs [s]; None for that of muscles, with which a foot gives back
+    half of what it takes."""
     pushes: tuple[float, ...] = (100.0, 200.0, 300.0)
     """Sizes of the pushes [N]; the searches have the first."""
     roughness: tuple[float, ...] = (0.01,)
@@ -113,6 +116,11 @@ class When(WalkingStudy):
             require_number("pushes", push, 0.0, 1000.0, above=True, unit="N")
         for rough in self.roughness:
             require_number("roughness", rough, 0.0, 0.1, above=True, unit="m")
+        if self.damping_time is not None:
+            if self.owner != "foot":
+                raise SpringfootError(f"damping_time needs owner 'foot', got {self.owner!r}")
+            allowed = SPRING_NUMBERS["damping_time"]
+            require_number("damping_time", self.damping_time, allowed.low, allowed.high, unit=allowed.unit)
         if self.keep is not None and self.keep.is_file():
             raise SpringfootError(f"keep must be a folder, {self.keep} is a file")
 
@@ -141,7 +149,8 @@ class When(WalkingStudy):
             pairs = {name: pair for aim in self.aims for name, pair in self._test_links(search, aim, best[aim]).items()}
             if self.owner == "foot":
                 pairs |= {
-                    (FOOT_WORK, (f"{inner} for {aim}", f"{outer} for {aim}"), words): pair
+                    (number, (f"{inner} for {aim}", f"{outer} for {aim}"), words): pair
+                    for number in BESIDE_AIM
                     for (aim, (inner, outer), words), pair in pairs.items()
                 }
             if len(best) > 1:
@@ -166,6 +175,7 @@ class When(WalkingStudy):
         return PersonsSearch(
             person=person,
             owner=self.owner,
+            damping_time=self.damping_time,
             seconds=self.seconds,
             seed=self.seed,
             population=self.population,

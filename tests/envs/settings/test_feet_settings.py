@@ -26,7 +26,7 @@ OF_AN_ORTHOSIS = f"{OF_A_SPRING}, engages"
 OF_A_FOOT = f"{RATIOS}, orthosis"
 OF_PASSIVE = f"{OF_A_SPRING}, {RATIOS}, ankle_table, toe_table, orthosis"
 WAY_LIST = "one of 'dorsiflexion', 'plantarflexion'"
-OF_ADAPTIVE = f"ankle_deg, toe_deg, {RATIOS}, schedule, orthosis"
+OF_ADAPTIVE = f"ankle_deg, toe_deg, damping_time, {RATIOS}, schedule, orthosis"
 
 WRONG_KINDS: list[tuple[Any, str]] = [
     ("rigd", f"right_foot must be one of {KIND_LIST}, got 'rigd'; perhaps rigid?"),
@@ -117,6 +117,10 @@ WRONG_NUMBERS: list[tuple[Any, str]] = [
     ({"kind": "weak", "strength": 0.05}, "right_foot: strength must be in [0.1, 0.6] (of the sound leg), got 0.05"),
     ({"kind": "weak", "strength": 30}, "right_foot: strength must be in [0.1, 0.6] (of the sound leg), got 30"),
     ({"kind": "adaptive", "ankle_deg": "2"}, "right_foot: ankle_deg must be in [-30, 30] deg, got '2'"),
+    (
+        {"kind": "adaptive", "damping_time": 0.01},
+        "right_foot: damping_time of an adaptive foot needs its schedule; else it is the muscles'",
+    ),
     (
         {"kind": "rigid", "shank_mass_ratio": 0},
         "right_foot: shank_mass_ratio must be in [0.1, 3] (of the intact one), got 0",

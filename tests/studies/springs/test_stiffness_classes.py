@@ -145,14 +145,17 @@ def test_a_foot_of_an_outer_class_with_the_inner_ones_vector_has_the_same_spring
     assert (springs(outer, within) != springs(inner, vector)).any()
 
 
-def test_a_foot_of_constant_stiffness_is_a_passive_foot_to_the_bit():
+@pytest.mark.parametrize("walker", ["schedule", "learned"])  # a person senses the stiffness
+@pytest.mark.parametrize("time", [None, 0.005])
+def test_a_foot_of_constant_stiffness_is_a_passive_foot_to_the_bit(walker, time):
     constant, *_ = OF_FOOT
     ankle, toe = constant.stiffness([0.3, 0.4], np.zeros(1))[0]
     passive = {"kind": "passive", "ankle_stiffness": ankle, "toe_stiffness": toe, "ankle_deg": 0.0, "toe_deg": 0.0}
-    acting, settings = policy_and_settings("schedule", {"episode_seconds": 1.0})
-    feet = [{"right_foot": foot} for foot in (constant.foot([0.3, 0.4]), passive)]
-    varied, fixed = record_feet(acting, settings, feet, name="schedule", episodes=1)
-    assert varied.series["angle"].tobytes() == fixed.series["angle"].tobytes()
+    passive |= {} if time is None else {"damping_time": time}
+    acting, settings = policy_and_settings(walker, {"episode_seconds": 1.0})
+    feet = [{"right_foot": foot} for foot in (constant.foot([0.3, 0.4], time), passive, "passive")]
+    varied, fixed, other = record_feet(acting, settings, feet, name=walker, episodes=1)
+    assert varied.series["angle"].tobytes() == fixed.series["angle"].tobytes() != other.series["angle"].tobytes()
 
 
 def test_the_stiffness_of_a_foot_that_changes_in_the_air_is_one_from_heel_strike_to_toe_off():

@@ -7,7 +7,7 @@ import pytest
 
 from springfoot.cli.main import study_main
 from springfoot.studies.base.intervals import visible
-from springfoot.studies.springs.links import Link, compared, fewest_falls, links_table, verdict
+from springfoot.studies.springs.links import BESIDE_AIM, Link, compared, fewest_falls, links_table, verdict
 
 NAMES = ("constant", "per phase")
 
@@ -139,6 +139,10 @@ def test_bad_flags_are_one_line(tmp_path, capsys):
     (tmp_path / "file").touch()
     assert study_main(["when", "--keep", str(tmp_path / "file")]) == 2
     assert "keep must be a folder" in capsys.readouterr().err
+    assert study_main(["when", "--damping-time", "0.01"]) == 2
+    assert capsys.readouterr().err == ("springfoot study when: error: damping_time needs owner 'foot', got 'person'\n")
+    assert study_main(["when", "--owner", "foot", "--damping-time", "0.2"]) == 2
+    assert "damping_time must be a finite number >= 0 and <= 0.1 s, got 0.2" in capsys.readouterr().err
 
 
 def test_a_foot_that_varies_is_compared_with_a_passive_one_by_its_work_too(tmp_path):
@@ -149,7 +153,7 @@ def test_a_foot_that_varies_is_compared_with_a_passive_one_by_its_work_too(tmp_p
     level = [row for row in rows if row["condition"] == "undisturbed"]
     assert [(row["aim"], row["inner"], row["outer"]) for row in level] == [
         (aim, f"{inner}{suffix}", f"{outer}{suffix}")
-        for aim, suffix in (("fibre", ""), ("foot work", " for fibre"))
+        for aim, suffix in (("fibre", ""), *((beside, " for fibre") for beside in BESIDE_AIM))
         for inner, outer in (
             ("constant", "in the air"),
             ("in the air", "per phase"),
@@ -158,6 +162,7 @@ def test_a_foot_that_varies_is_compared_with_a_passive_one_by_its_work_too(tmp_p
             ("constant", "open loop"),
         )
     ]
-    assert -0.5 < float(level[5]["inner_mean"]) < 0.0  # a passive foot gives back less than it takes
+    passive = {row["aim"]: float(row["inner_mean"]) for row in level if row["inner"].startswith("constant")}
+    assert -passive["foot takes"] < passive["foot work"] < 0.0  # it gives back less than it takes
     report = (tmp_path / "out/report.md").read_text()
     assert "adaptive right foot" in report and "reflex" not in report
