@@ -112,7 +112,7 @@ def effort_numbers(episodes: Sequence[EpisodeEffort], body: Body) -> dict[str, A
             **nothing,
             **dict.fromkeys(("rate", "acceleration", "total")),
             "per_joint": dict.fromkeys(JOINTS, nothing),
-            "per_leg": dict.fromkeys(SIDES, nothing),
+            "per_leg": {side: {**nothing, "per_joint": dict.fromkeys(JOINTS, nothing)} for side in SIDES},
         }
     total = _EpisodeSums.of(episodes)
     # Of the body alone, as people's costs are stated; `mean_effort` has the weight with load, which the muscles carry.
@@ -130,13 +130,19 @@ def effort_numbers(episodes: Sequence[EpisodeEffort], body: Body) -> dict[str, A
         }
 
     parts = total.energy, total.net_energy, total.activation
+
+    def of_leg(side: int) -> dict[str, Any]:
+        """Return the numbers of one leg, and of each of its joints."""
+        per_joint = {joint: numbers_of(*(part[side, index] for part in parts)) for index, joint in enumerate(JOINTS)}
+        return {**numbers_of(*(part[side] for part in parts)), "per_joint": per_joint}
+
     return {
         **numbers_of(*parts),
         "rate": effort.rate,
         "acceleration": effort.acceleration,
         "total": effort.total,
         "per_joint": {joint: numbers_of(*(part[:, index] for part in parts)) for index, joint in enumerate(JOINTS)},
-        "per_leg": {side: numbers_of(*(part[index] for part in parts)) for index, side in enumerate(SIDES)},
+        "per_leg": {side: of_leg(index) for index, side in enumerate(SIDES)},
     }
 
 

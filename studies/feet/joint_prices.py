@@ -2,8 +2,8 @@
 
     springfoot study joint-prices learned learned-2 learned-3 learned-4 learned-5
 
-Each comparison changes one thing, so that it tells a reason: a spring that acts one way or both ways, with stiffness
-that the person may tune to it or not; a missing ankle on even ground or uneven one.
+Each comparison stands for a possible reason: a spring that acts one way or both ways, with damping or without, with
+stiffness that the person may tune to it or not; a missing ankle with less damping, or on uneven ground.
 """
 
 from collections.abc import Mapping, Sequence
@@ -23,13 +23,25 @@ from ..base.condition_walks import ConditionWalks
 from ..base.kept import Kept
 from ..base.study import Answer, OnProgress, WalkingStudy
 from ..base.walked_speeds import TWO_PRICES, Row, price_numbers, rows_csv
-from .controls import ONE_WAY, TWO_WAY
+from .both_feet import both, braced
+from .controls import ONE_WAY, TWO_WAY, WITH_MASS
 
 BY_SCHEDULE = {"stiffness_by": "schedule"}
 """Setting with which the fixed schedule sets the stiffness, so that nobody tunes it to a device."""
 UNEVEN = {"unevenness_m": 0.005}
 """Setting of uneven ground."""
-PASSIVE = {"right_foot": {"kind": "passive", "ankle_stiffness": 400.0}}
+UNDAMPED = 0.0
+"""Damping time of springs that lose nothing [s], as one-way ones are."""
+LITTLE_DAMPED = 0.005
+"""Damping time of a foot that gives back some four fifths of what it takes [s]; chosen. By default springs have the
+damping of muscles, with which it gives back half."""
+
+
+def _passive(**numbers: float) -> dict[str, Any]:
+    """Return the settings of a walk on a passive right foot of 400 N m/rad and further `numbers`."""
+    return {"right_foot": {"kind": "passive", "ankle_stiffness": 400.0, **numbers}}
+
+
 JOINT_CONDITIONS: dict[str, Mapping[str, Any]] = {
     "sound": {},
     "sound, ground uneven by 5 mm": UNEVEN,
@@ -39,8 +51,12 @@ JOINT_CONDITIONS: dict[str, Mapping[str, Any]] = {
     "one-way springs, 150 N·m/rad": ONE_WAY.settings[150.0],
     "150 N·m/rad, scheduled K": {**ONE_WAY.settings[150.0], **BY_SCHEDULE},
     "two-way springs, 150 N·m/rad": TWO_WAY.settings[150.0],
-    "passive right foot, 400 N·m/rad": PASSIVE,
-    "passive, ground uneven by 5 mm": PASSIVE | UNEVEN,
+    "two-way springs without damping": both(
+        braced(ankle_stiffness=150.0, damping_time=UNDAMPED) | WITH_MASS,
+    ),
+    "passive right foot, 400 N·m/rad": _passive(),
+    "passive, damping of 5 ms": _passive(damping_time=LITTLE_DAMPED),
+    "passive, ground uneven by 5 mm": _passive() | UNEVEN,
     "rigid right foot": {"right_foot": "rigid"},
 }
 """Name of a condition -> settings that differ from the sound walk."""
@@ -49,17 +65,23 @@ JOINT_COMPARISONS = {
     "one-way springs, 150 N·m/rad": "slack springs",
     "150 N·m/rad, scheduled K": "slack springs, scheduled K",
     "two-way springs, 150 N·m/rad": "slack springs",
+    "two-way springs without damping": "slack springs",
     "passive right foot, 400 N·m/rad": "sound",
+    "passive, damping of 5 ms": "sound",
     "passive, ground uneven by 5 mm": "sound, ground uneven by 5 mm",
     "rigid right foot": "sound",
 }
 """Condition -> the one that it is compared with."""
-JOINT_COLUMNS = (
-    *(f"{joint}_J_kg_m" for joint in JOINTS),
-    *(f"{side}_leg_J_kg_m" for side in SIDES),
-    "ankle_activation",
-)
-"""Numbers of a walk beside its prices: fibre work of a joint of both legs, of a leg, and activation of the ankles."""
+JOINT_COLUMNS = (*(f"{side}_{joint}_J_kg_m" for side in SIDES for joint in JOINTS), "ankle_activation")
+"""Numbers of a walk beside its prices: fibre work of each joint, and activation of both ankles."""
+SHOWN_TOGETHER = {
+    "hips": ("left_hip", "right_hip"),
+    "knees": ("left_knee", "right_knee"),
+    "left ankle": ("left_ankle",),
+    "right ankle": ("right_ankle",),
+    "toes": ("left_toe", "right_toe"),
+}
+"""Column of the table -> joints with fibre work that it sums."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,8 +121,8 @@ class JointPrices(WalkingStudy):
             for name, numbers in zip(JOINT_CONDITIONS, walks.walk(person, asked, progress), strict=True)
         ]
         text = (
-            f"{joint_table(rows)}\n\nChanges of fibre work [J/kg/m], both legs together, of both prices and of the "
-            "ankles' activation: mean over persons, least and largest in brackets. A dash: somebody falls. "
+            f"{joint_table(rows)}\n\nChanges of fibre work [J/kg/m], of both prices and of the ankles' activation: "
+            "mean over persons, least and largest in brackets. A dash: somebody falls. "
             f"{self.what_ran} of each, commanded {self.speed:g} m/s."
         )
         return Answer(text=text, files={"joint_prices.csv": rows_csv(rows)})
@@ -109,28 +131,34 @@ class JointPrices(WalkingStudy):
 def joint_numbers(recording: Recording) -> dict[str, float | None]:
     """Return the numbers of `price_numbers` and `JOINT_COLUMNS` of a recording; None where they cannot be measured."""
     metrics = measure(recording).metrics
-    of_joints, of_legs = metrics["effort"]["per_joint"], metrics["effort"]["per_leg"]
-    works = [*(of_joints[joint]["fibre_J_kg_m"] for joint in JOINTS), *(of_legs[s]["fibre_J_kg_m"] for s in SIDES)]
-    return price_numbers(metrics) | dict(zip(JOINT_COLUMNS, [*works, of_joints["ankle"]["activation"]], strict=True))
+    effort = metrics["effort"]
+    works = [effort["per_leg"][side]["per_joint"][joint]["fibre_J_kg_m"] for side in SIDES for joint in JOINTS]
+    activation = effort["per_joint"]["ankle"]["activation"]
+    return price_numbers(metrics) | dict(zip(JOINT_COLUMNS, [*works, activation], strict=True))
 
 
 def joint_table(rows: Sequence[Row]) -> str:
     """Return the Markdown table of the changes of `JOINT_COMPARISONS`, from a row for each person and condition."""
     persons = list(dict.fromkeys(row["person"] for row in rows))
     by_walk = {(row["person"], row["condition"]): row for row in rows}
-    joints = [f"{joint}_J_kg_m" for joint in JOINTS]
     shares = (*TWO_PRICES, JOINT_COLUMNS[-1])
     lines = []
     for name, against in JOINT_COMPARISONS.items():
         pairs = [(by_walk[person, name], by_walk[person, against]) for person in persons]
         line = [f"{name}, against {against}"]
         if any(row["falls"] for pair in pairs for row in pair):
-            lines.append([*line, *[MISSING] * (len(joints) + len(shares))])
+            lines.append([*line, *[MISSING] * (len(SHOWN_TOGETHER) + len(shares))])
             continue
-        line += [_ends([own[joint] - other[joint] for own, other in pairs], "+.2f") for joint in joints]
+        for joints in SHOWN_TOGETHER.values():
+            line.append(_ends([_work(own, joints) - _work(other, joints) for own, other in pairs], "+.2f"))
         line += [_ends([own[price] / other[price] - 1.0 for own, other in pairs], "+.0%") for price in shares]
         lines.append(line)
-    return table(["", *JOINTS, "all fibre work", "effort", "activation of ankles"], lines)
+    return table(["", *SHOWN_TOGETHER, "all fibre work", "effort", "activation of ankles"], lines)
+
+
+def _work(row: Row, joints: Sequence[str]) -> float:
+    """Return the fibre work of some joints together, such as "left_hip" [J/kg/m]."""
+    return sum(row[f"{joint}_J_kg_m"] for joint in joints)
 
 
 def _ends(changes: Sequence[float], form: str) -> str:

@@ -20,9 +20,9 @@ FOOT_WORK = "foot work"
 """Net work of an adaptive right foot's ankle and toe in a stride, > 0 where it gives more than it takes."""
 FOOT_TAKES = "foot takes"
 """Work that the same foot takes in a stride, the negative part."""
-EFFORT = "effort"
+ALL_EFFORT = "effort"
 """All of the effort (`springfoot.gait.plan.Effort.total`)."""
-BESIDE_AIM = (EFFORT, FOOT_WORK, FOOT_TAKES)
+BESIDE_AIM = (ALL_EFFORT, FOOT_WORK, FOOT_TAKES)
 """Numbers that are compared beside the aim where an adaptive foot has the stiffness."""
 UNIT_OF_NUMBER: dict[str, str] = {
     **dict(zip(get_args(Aim), ("J/kg/m", "°"), strict=True)),

@@ -228,9 +228,11 @@ def test_effort_is_the_plans_price_of_peoples_curves(gait):
     assert effort["rate"] == pytest.approx(own.rate, rel=0.02)
     assert effort["acceleration"] == pytest.approx(own.acceleration, rel=0.03)
     assert effort["total"] == pytest.approx(own.total, rel=0.02)
-    for parts in (effort["per_joint"], effort["per_leg"]):
+    wholes = [(effort, effort["per_joint"]), (effort, effort["per_leg"])]
+    wholes += [(leg, leg["per_joint"]) for leg in effort["per_leg"].values()]
+    for whole, parts in wholes:
         for name in ("fibre_J_kg_m", "net_joint_J_kg_m", "activation"):
-            assert sum(part[name] for part in parts.values()) == pytest.approx(effort[name])
+            assert sum(part[name] for part in parts.values()) == pytest.approx(whole[name])
 
 
 def test_net_joint_energy_is_the_price_of_peoples_joint_work(gait):
