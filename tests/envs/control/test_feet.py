@@ -29,6 +29,7 @@ from springfoot.envs.settings.settings import settings_from
 from springfoot.envs.vector_env import SegmentedFootBipedVector
 from springfoot.gait.body.body import Body
 from springfoot.gait.body.tissue import ankle_tissue_stiffness, passive_moments
+from springfoot.gait.springs.stiffness import thesis_schedule
 
 LEFT, RIGHT = 0, 1
 SPRING = {"kind": "passive", "ankle_stiffness": 400.0, "ankle_deg": 4.0, "toe_stiffness": 30.0, "toe_deg": 5.0}
@@ -308,10 +309,12 @@ def test_every_number_of_a_foot_changes_the_foot():
     def physical(foot):
         return foot_setting("right_foot", foot).foot
 
+    scheduled = {"kind": "adaptive", "schedule": thesis_schedule(Body()).to_json()}
     for kind, numbers in KINDS.items():
         for name, number in (numbers | SEGMENT_RATIOS).items():
-            other = {"kind": kind, name: 0.5 * (number.low + number.high)}
-            assert physical(other) != physical(kind), (kind, name)
+            foot = scheduled if (kind, name) == ("adaptive", "damping_time") else {"kind": kind}
+            other = foot | {name: 0.5 * (number.low + number.high)}
+            assert physical(other) != physical(foot), (kind, name)
     for name, number in ORTHOSIS_NUMBERS.items():
         orthosis = {"ankle_stiffness": 50.0, "toe_stiffness": 5.0}
         other = {"kind": "intact", "orthosis": orthosis | {name: 0.45 * number.high}}
