@@ -12,7 +12,7 @@ searches would add their luck to the change with speed.
 
 import json
 import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
@@ -309,45 +309,53 @@ class PlanTuning(Study):
         found = {speed: style_at(self._vector_at(best, speed), self.cadence) for speed in self.found_speeds}
         self._write_styles(found)
         parts = [f"{speed:g} m/s: {json.dumps(style.to_json())}" for speed, style in found.items()]
+        close = self._plans_of(near, body)
         for speed in self.speeds:
             cost, plan, effort = self._price(body, speed, self._vector_at(best, speed))
             parts.append(f"{speed:g} m/s: paid {cost:.4f}: {effort}")
-            if plan is not None:
-                parts.append(self._beside_people(plan, near, body, speed))
-        if len(self.found_speeds) > 1:
-            parts.append(self._changes(near, body))
+            if plan is not None and close:
+                parts.append(self._beside_people(plan, [plans[speed] for plans in close], speed))
+        if len(self.found_speeds) > 1 and close:
+            parts.append(self._changes(close))
         return Answer(
             text="\n\n".join(parts), files={"generations.csv": csv_text(["generation", "best", "median"], lines)}
         )
 
-    def _beside_people(self, plan: WalkPlan, near: Sequence[NDArray], body: Body, speed: float) -> str:
-        """Return the table of people and the best `plan` at `speed` [m/s], and of the spread of the candidates `near`
-        it, the first."""
+    def _beside_people(self, plan: WalkPlan, close: Sequence[tuple[WalkPlan, Effort]], speed: float) -> str:
+        """Return the table of people and the best `plan` at `speed` [m/s], and of the spread of plans `close` to it in
+        cost, each with its effort."""
         human = human_gait(speed)
-        plans, efforts = zip(*self._plans_of(near, body, speed), strict=True)
+        plans = [one for one, _ in close]
         people, best, *numbers = (prediction_numbers(gait, human) for gait in (human, *map(gait_of, (plan, *plans))))
         spans = {f"plans within {NEARLY_LEAST - 1:.0%} of its cost": numbers}
         text = prediction_table({"people": people, "the plan": best}, ("the plan",), spans)
-        works = [effort.work * GRAVITY for effort in efforts]
+        works = [effort.work * GRAVITY for _, effort in close]
         return (
-            f"{text}\n\nThe spread is that of {len(plans)} of {len(near)} plans, which take {span_text(works, '.2f')} "
-            "J/kg/m of fibre work."
+            f"{text}\n\nThe spread is that of {len(close)} plans, which take {span_text(works, '.2f')} J/kg/m of fibre "
+            "work."
         )
 
-    def _changes(self, near: Sequence[NDArray], body: Body) -> str:
-        """Return the table of the changes from the first to the last speed: of people, the best plan, and the
-        candidates `near` it, the first."""
-        ends = [[stride_of_gait(gait_of(plan)) for plan, _ in self._plans_of(near, body, v)] for v in self.found_speeds]
-        people = [stride_of_gait(human_gait(speed)) for speed in self.found_speeds]
-        slowest, fastest = self.found_speeds
-        return f"{spans_table(people, [*zip(*ends, strict=True)])}\n\nChanges from {slowest:g} to {fastest:g} m/s."
+    def _changes(self, close: Sequence[Mapping[float, tuple[WalkPlan, Effort]]]) -> str:
+        """Return the table of the changes from the first to the last speed: of people, and of plans `close` to the best
+        in cost, by speed [m/s]; the best is the first."""
+        ends = self.found_speeds
+        people = [stride_of_gait(human_gait(speed)) for speed in ends]
+        walks = [[stride_of_gait(gait_of(plans[speed][0])) for speed in ends] for plans in close]
+        return f"{spans_table(people, walks)}\n\nChanges from {ends[0]:g} to {ends[1]:g} m/s."
 
-    def _plans_of(self, near: Sequence[NDArray], body: Body, speed: float) -> list[tuple[WalkPlan, Effort]]:
-        """Return plan and effort at `speed` [m/s] of at most `MOST_NEAR` of the candidates `near` the best, the first
-        among them; `near` ascends by cost."""
-        chosen = [near[k] for k in np.unique(np.linspace(0, len(near) - 1, MOST_NEAR).astype(int))]
-        priced = [self._price(body, speed, self._vector_at(candidate, speed))[1:] for candidate in chosen]
-        return [(plan, effort) for plan, effort in priced if plan is not None and effort is not None]
+    def _plans_of(self, near: Sequence[NDArray], body: Body) -> list[dict[float, tuple[WalkPlan, Effort]]]:
+        """Return plan and effort at each of the flag `speeds` [m/s], of at most `MOST_NEAR` of the candidates `near`
+        the best in cost, the first among them; those with an impossible plan are left out."""
+        found = []
+        for k in np.unique(np.linspace(0, len(near) - 1, MOST_NEAR).astype(int)):
+            plans = {}
+            for speed in self.speeds:
+                _, plan, effort = self._price(body, speed, self._vector_at(near[k], speed))
+                if plan is not None and effort is not None:
+                    plans[speed] = plan, effort
+            if len(plans) == len(self.speeds):
+                found.append(plans)
+        return found
 
     def _vector_at(self, candidate: NDArray, speed: float) -> NDArray:
         """Return the vector of a candidate's style at `speed` [m/s], linear between its vectors at `found_speeds`."""
