@@ -3,6 +3,7 @@
 Submissions of one name but for ", seed N" are one entry: the trainings of a learner.
 """
 
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -18,8 +19,8 @@ from .task_walks import EPISODES
 
 MOST_ROWS = 8
 """Most rows of a task's table; chosen, a table that is read."""
-NOT_RUN = 'make benchmark BENCHMARK="--learners sb3-ppo --tasks Pushed-v0"'
-"""Command that makes a cell of the scores."""
+_OF_MAKE = re.compile(r"(?P<learner>.+)-(?P<timesteps>\d+)-seed-\d+")
+"""Name of the folder of a training by `make benchmark`: its flags `--learners` and `--timesteps`."""
 
 
 def leaderboard(folder: Path) -> str:
@@ -28,6 +29,7 @@ def leaderboard(folder: Path) -> str:
     rows = judged_rows(folder)
     public, drawn = learner_scores(rows), learner_scores(rows, "drawn_return_mean")
     parts = [text] if (text := _scores_section(public, drawn)) else []
+    parts += [text] if (text := _not_run(rows, public)) else []
     head = ["entry", "return", "falls", "return, drawn", "falls, drawn"]
     for task in TASKS:
         entries: dict[str, list[JudgedRow]] = {}
@@ -70,10 +72,22 @@ def _scores_section(public: LearnerScores, drawn: LearnerScores) -> str:
     ]
     if below := [task for task in run if task not in above]:
         words.append(f"Not better: {', '.join(below)}.")
-    if any(task not in public[name] for name in learners for task in tasks):
-        words.append(f"A cell that is not run: `{NOT_RUN}`, or likewise with its learner and task.")
     tables = [_scores_table("score", tasks, public), _scores_table("score, drawn", tasks, drawn)]
     return "\n\n".join(["## Learners", *tables, " ".join(words)])
+
+
+def _not_run(rows: Sequence[JudgedRow], scores: LearnerScores) -> str:
+    """Return a Markdown list of the commands that run the learners of `make benchmark` on the tasks without a score of
+    theirs; empty if each has one on all."""
+    lines = []
+    for learner, by_task in scores.items():
+        left = [task for name in STIFFNESS_TASKS if (task := f"{name}-{VERSION}") not in by_task]
+        folders = [row.submission.folder.name for row in rows if row.entry == learner]
+        made = next(filter(None, map(_OF_MAKE.fullmatch, folders)), None)
+        if left and made:
+            flags = f"--learners {made['learner']} --timesteps {made['timesteps']} --tasks {' '.join(left)}"
+            lines.append(f'- {learner}: `make benchmark BENCHMARK="{flags}"`')
+    return "\n".join(["Commands of the cells that are not run:", "", *lines]) if lines else ""
 
 
 def _scores_table(head: str, tasks: Sequence[str], scores: LearnerScores) -> str:

@@ -110,6 +110,10 @@ PER_METRE_LOW, PER_UNIT = 200.0, 10.0
 NEARLY_LEAST, MOST_NEAR = 1.1, 50
 """Cost over the least cost up to which a plan counts as nearly as good, and how many of those that a search meets are
 held against people; chosen. The spread of their numbers tells how much least effort leaves open."""
+BEFORE_LANDING = 0.05
+"""Fraction of the stride before heel strike at which the ankle's angle is told; chosen."""
+PER_LANDING = 0.01
+"""Cost of that angle's distance from the flag `landing_deg`, squared [1/deg^2]; chosen: 1° costs 0.7 % of a plan."""
 IMPOSSIBLE = 30.0
 """Cost of an impossible plan, to which the distance of its choices from the start is added; chosen."""
 
@@ -195,6 +199,11 @@ def distances_deg(plan: WalkPlan, speed: float) -> NDArray:
     return np.array([joints[joint]["rmse_deg"] for joint in COMPARED_JOINTS])
 
 
+def landing_ankle_deg(gait: HumanGait) -> float:
+    """Return the ankle's mean angle `BEFORE_LANDING` heel strike [deg], dorsiflexion positive."""
+    return float(np.degrees(gait.mean("ankle", 1.0 - BEFORE_LANDING)))
+
+
 @dataclass(frozen=True, kw_only=True)
 class PlanTuning(Study):
     """Find the plans of least effort by CMA-ES, and write their styles into a file."""
@@ -225,6 +234,9 @@ class PlanTuning(Study):
     likeness: float = 0.0
     """Weight of the angles' mean squared distance from people's [1/deg^2], to tell how near to people plans of little
     effort come; a prediction has none."""
+    landing_deg: float | None = None
+    """Angle of the ankle shortly before heel strike that the search pays for, dorsiflexion positive, to tell what it
+    costs to land with people's; a prediction has none."""
     start: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = None
     """File of styles to begin at, in place of round numbers."""
     styles: Annotated[Path, tyro.conf.arg(metavar="FILE")] = STYLES
@@ -246,6 +258,8 @@ class PlanTuning(Study):
             require_number(name, getattr(self, name), 0)
         for weight in self.weights:
             require_number("weights", weight, 0)
+        if self.landing_deg is not None:
+            require_number("landing_deg", self.landing_deg, -30.0, 30.0, unit="deg")
         require_number("step_time_ratio", self.step_time_ratio, *STEP_TIME_RATIO_RANGE)
         if self.cadence != "people" and self.step_time_ratio != 1.0:
             raise SpringfootError(f"step_time_ratio needs cadence 'people', got {self.cadence!r}")
@@ -330,9 +344,11 @@ class PlanTuning(Study):
         spans = {f"plans within {NEARLY_LEAST - 1:.0%} of its cost": numbers}
         text = prediction_table({"people": people, "the plan": best}, ("the plan",), spans)
         works = [effort.work * GRAVITY for _, effort in close]
+        landings = [landing_ankle_deg(gait) for gait in (human, *map(gait_of, (plan, *plans)))]
         return (
             f"{text}\n\nThe spread is that of {len(close)} plans, which take {span_text(works, '.2f')} J/kg/m of fibre "
-            "work."
+            f"work. Their ankle is at {span_text(landings[2:], '.1f')}° {BEFORE_LANDING:.0%} of the stride before heel "
+            f"strike, the plan's at {landings[1]:.1f}°, people's at {landings[0]:.1f}° (dorsiflexion positive)."
         )
 
     def _changes(self, close: Sequence[Mapping[float, tuple[WalkPlan, Effort]]]) -> str:
@@ -366,13 +382,15 @@ class PlanTuning(Study):
         return ends[0] + (speed - slowest) / (fastest - slowest) * (ends[1] - ends[0])
 
     def _mean_price(self, body: Body, candidate: NDArray) -> float:
-        """Return the mean over the flag `speeds` of a candidate's cost: that of `price`, and with `likeness` that of
-        the distance from people."""
+        """Return the mean over the flag `speeds` of a candidate's cost: that of `price`, and those of the flags
+        `likeness` and `landing_deg`."""
         costs = []
         for speed in self.speeds:
             cost, plan, _ = self._price(body, speed, self._vector_at(candidate, speed))
             if self.likeness and plan is not None:
                 cost += self.likeness * float(np.mean(np.square(distances_deg(plan, speed))))
+            if self.landing_deg is not None and plan is not None:
+                cost += PER_LANDING * (landing_ankle_deg(gait_of(plan)) - self.landing_deg) ** 2
             costs.append(cost)
         return float(np.mean(costs))
 

@@ -28,6 +28,7 @@ from springfoot.evaluation.benchmark.task_walks import (
     with_drawn_bodies,
 )
 from springfoot.files.json_file import object_with_digest, read_object
+from springfoot.tasks import STIFFNESS_TASKS, VERSION
 
 REPOSITORY = Path(__file__).parents[3]
 TASK = "Walk-v0"
@@ -313,10 +314,14 @@ def test_trainings_of_one_learner_are_one_entry_with_both_scores(submitted, tmp_
         (tmp_path / name / benchmark.SUBMISSION).write_bytes(object_with_digest(values))
         judged = read_object(tmp_path / name / benchmark.JUDGED, "judgement") | own
         (tmp_path / name / benchmark.JUDGED).write_bytes(object_with_digest(judged))
+    for seed in (0, 1):
+        (tmp_path / f"ours, seed {seed}").rename(tmp_path / f"sac-800-seed-{seed}")
     board = leaderboard(tmp_path)
     assert f"| {TASK} | 1.75 (1.50 to 2.00) |" in board  # 4 and 5, where random returns 1 and springs 3
     assert f"| {TASK} | {drawn} |" in board
-    assert f"with all of both intervals, on: {better} A cell that is not run: `make benchmark " in board
+    assert f"with all of both intervals, on: {better}\n" in board
+    left = " ".join(f"{name}-{VERSION}" for name in STIFFNESS_TASKS if f"{name}-{VERSION}" != TASK)
+    assert f'- ours: `make benchmark BENCHMARK="--learners sac --timesteps 800 --tasks {left}"`' in board
     assert "| ours (2 seeds) | 4 (4 to 5) |" in board and "seed 0" not in board
 
 

@@ -184,14 +184,28 @@ def test_a_search_for_likeness_pays_for_the_squared_distance_from_people_beside_
     assert distance.min() > 1.0
 
 
+def test_a_search_for_a_landing_pays_for_the_ankles_squared_distance_from_that_angle(tmp_path):
+    styles = tmp_path / "styles.json"
+    search = PlanTuning(landing_deg=3.0, generations=1, population=4, sigma=0.02, start=STYLES, styles=styles)
+    answer = search.ask(lambda _: None)
+    _, line = answer.files["generations.csv"].splitlines()
+    effort, plan, _ = price(BODY, 1.2, vector_of(least_work(1.2, styles)))
+    assert plan is not None
+    landing = np.degrees(gait_of(plan).mean("ankle", 0.95))
+    people = np.degrees(human_gait(1.2).mean("ankle", 0.95))
+    assert float(line.split(",")[1]) == pytest.approx(effort + 0.01 * (landing - 3.0) ** 2, rel=1e-3)
+    assert f"the plan's at {landing:.1f}°, people's at {people:.1f}°" in answer.text and landing > people + 5.0
+
+
 @pytest.mark.parametrize(
     ("given", "said"),
     [
+        ({"landing_deg": 31.0}, "landing_deg must be .*got 31"),
         ({"step_time_ratio": 0.7}, "step_time_ratio must be .*got 0.7"),
         ({"step_time_ratio": 0.9, "cadence": "effort"}, "step_time_ratio needs cadence 'people', got 'effort'"),
     ],
 )
-def test_a_step_time_that_cannot_be_held_is_refused(given, said):
+def test_a_step_time_or_landing_that_no_walk_has_is_refused(given, said):
     with pytest.raises(SpringfootError, match=said):
         PlanTuning(**given).check()
 
