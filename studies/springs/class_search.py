@@ -9,6 +9,7 @@ from typing import Any, Literal, NamedTuple
 import cma
 import numpy as np
 
+from springfoot.agents import read_policy
 from springfoot.agents.policies import find_policy
 from springfoot.arrays import NDArray
 from springfoot.envs.batch import Biped
@@ -210,9 +211,10 @@ class PersonsSearch:
 
 @lru_cache(maxsize=8)
 def _batch(person: str, seconds: float, condition: Condition, count: int, threads: int) -> Biped:
-    """Return `count` environments with the person and the condition, cached: reset them before each use. The ankle's K
-    is at most that of its tendon, as when the person learned."""
-    given = {"person": person, "episode_seconds": seconds, "ankle_tendon": ANKLE_TENDON, **condition._asdict()}
+    """Return `count` environments with the person, its guide and the condition, cached: reset them before each use. The
+    ankle's K is at most that of its tendon, as when the person learned."""
+    given = {"person": person, "guide": read_policy(person).settings.guide, "ankle_tendon": ANKLE_TENDON}
+    given |= {"episode_seconds": seconds, **condition._asdict()}
     _, settings = policy_and_settings("constant", given)
     return Biped(settings, count, threads)
 

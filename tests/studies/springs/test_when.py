@@ -6,8 +6,14 @@ import numpy as np
 import pytest
 
 from springfoot.cli.main import study_main
+from springfoot.envs import BipedSettings
+from springfoot.evaluation.numbers import measure
+from springfoot.evaluation.recording import policy_and_settings, record
 from springfoot.studies.base.intervals import visible
+from springfoot.studies.base.kept import Kept
+from springfoot.studies.springs.class_search import TEST_SEED, Condition, PersonsSearch
 from springfoot.studies.springs.links import BESIDE_AIM, Link, compared, fewest_falls, links_table, verdict
+from springfoot.studies.springs.stiffness_classes import nested_classes
 
 NAMES = ("constant", "per phase")
 
@@ -129,6 +135,29 @@ def test_kept_costs_and_numbers_are_not_walked_again(tmp_path, monkeypatch, caps
     assert {row["condition"] for row in rows} == {"undisturbed", "±100 N", "rough by 10 mm"}
     told = capsys.readouterr().out
     assert "constant → per phase" in told and "linear reflex → 80 ms late" in told
+
+
+def test_a_person_of_the_plan_walks_under_the_plan():
+    search = PersonsSearch(
+        person="predicted",
+        owner="person",
+        damping_time=None,
+        seconds=6.0,
+        seed=0,
+        population=2,
+        choosing=1,
+        push_newton=100.0,
+        threads=1,
+        folder=None,
+        kept=Kept(None),
+        progress=lambda _: None,
+    )
+    constant, *_ = nested_classes(BipedSettings())
+    numbers = search.test_numbers(constant, np.zeros(constant.size), Condition(), 1)
+    act, settings = policy_and_settings("predicted", {"episode_seconds": 6.0})
+    own = measure(record(act, settings, name="predicted", episodes=1, seed=TEST_SEED)).metrics
+    assert not any(numbers["fell"]) and numbers["speed_m_s"][0] == pytest.approx(own["speed_m_s"]["mean"], abs=0.02)
+    assert numbers["fibre"][0] == pytest.approx(own["effort"]["fibre_J_kg_m"], rel=0.15)
 
 
 def test_bad_flags_are_one_line(tmp_path, capsys):
