@@ -220,7 +220,7 @@ def _batch(person: str, seconds: float, condition: Condition, count: int, thread
 
 
 def aim_numbers(recording: Recording) -> dict[str, Any]:
-    """Return speed, the number of each `Aim` and, on unlike feet, those of `BESIDE_AIM` of a recording, from its
+    """Return speed, the number of each `Aim`, and those of `BESIDE_AIM`, None on like feet, of a recording, from its
     metrics; None of all if one is missing."""
     metrics = measure(recording).metrics
     angles = [metrics["joints"][joint]["rmse_deg"] for joint in COMPARED_JOINTS]
@@ -228,9 +228,10 @@ def aim_numbers(recording: Recording) -> dict[str, Any]:
     speed = metrics["speed_m_s"]["mean"]
     of_legs = metrics["per_leg"]  # None on like feet
     work = [] if of_legs is None else [of_legs["right"]["joint_work_J_kg"][joint] for joint in SPRINGS]
+    numbers = {"speed_m_s": None, **dict.fromkeys(UNIT_OF_NUMBER)}
     if None in (*angles, fibre, speed, *(joint["positive"] for joint in work)):
-        return {"speed_m_s": None, **dict.fromkeys(UNIT_OF_NUMBER)}
-    numbers = {"speed_m_s": speed, "fibre": fibre, "likeness": float(np.mean(angles))}
+        return numbers
+    numbers |= {"speed_m_s": speed, "fibre": fibre, "likeness": float(np.mean(angles))}
     if work:
         given, taken = (sum(joint[part] for joint in work) for part in ("positive", "negative"))
         numbers |= zip(BESIDE_AIM, (metrics["effort"]["total"], given - taken, taken), strict=True)

@@ -1,6 +1,7 @@
 """The study of varying stiffness: planted differences and their intervals, falls, and a search that goes on."""
 
 import csv
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from springfoot.evaluation.numbers import measure
 from springfoot.evaluation.recording import policy_and_settings, record
 from springfoot.studies.base.intervals import visible
 from springfoot.studies.base.kept import Kept
-from springfoot.studies.springs.class_search import TEST_SEED, Condition, PersonsSearch
+from springfoot.studies.springs.class_search import TEST_SEED, Condition, PersonsSearch, aim_numbers
 from springfoot.studies.springs.links import BESIDE_AIM, Link, compared, fewest_falls, links_table, verdict
 from springfoot.studies.springs.stiffness_classes import nested_classes
 
@@ -156,6 +157,8 @@ def test_a_person_of_the_plan_walks_under_the_plan():
     numbers = search.test_numbers(constant, np.zeros(constant.size), Condition(), 1)
     act, settings = policy_and_settings("predicted", {"episode_seconds": 6.0})
     own = measure(record(act, settings, name="predicted", episodes=1, seed=TEST_SEED)).metrics
+    short = record(act, replace(settings, episode_seconds=0.5), name="predicted", episodes=1)
+    assert set(aim_numbers(short).values()) == {None} and {*aim_numbers(short), "fell"} == {*numbers}
     assert not any(numbers["fell"]) and numbers["speed_m_s"][0] == pytest.approx(own["speed_m_s"]["mean"], abs=0.02)
     assert numbers["fibre"][0] == pytest.approx(own["effort"]["fibre_J_kg_m"], rel=0.15)
 
