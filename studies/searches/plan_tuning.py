@@ -200,7 +200,7 @@ def distances_deg(plan: WalkPlan, speed: float) -> NDArray:
 
 
 def landing_ankle_deg(gait: HumanGait) -> float:
-    """Return the ankle's mean angle `BEFORE_LANDING` heel strike [deg], dorsiflexion positive."""
+    """Return the ankle's mean angle at `BEFORE_LANDING` [deg], dorsiflexion positive."""
     return float(np.degrees(gait.mean("ankle", 1.0 - BEFORE_LANDING)))
 
 
@@ -235,8 +235,8 @@ class PlanTuning(Study):
     """Weight of the angles' mean squared distance from people's [1/deg^2], to tell how near to people plans of little
     effort come; a prediction has none."""
     landing_deg: float | None = None
-    """Angle of the ankle shortly before heel strike that the search pays for, dorsiflexion positive, to tell what it
-    costs to land with people's; a prediction has none."""
+    """Angle of the ankle shortly before heel strike, dorsiflexion positive, that the search pays for missing, to tell
+    what people's landing costs; a prediction has none."""
     start: Annotated[Path | None, tyro.conf.arg(metavar="FILE", help_behavior_hint="")] = None
     """File of styles to begin at, in place of round numbers."""
     styles: Annotated[Path, tyro.conf.arg(metavar="FILE")] = STYLES
