@@ -22,17 +22,17 @@ import subprocess
 import sys
 import time
 import tomllib
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from queue import SimpleQueue
-from typing import Any, TypeVar
+from typing import Any
 
-from benchmarks.checkout import Checkout, Ended, Processes
+from benchmarks.checkout import Checkout
 from benchmarks.executed_lines import FOLDER, REPOSITORY
 from benchmarks.mutation import Mutant, Site, find, sites_of_rooms
+from benchmarks.processes import Ended, Processes
 
 ROOMS = ("gait", "envs", "agents")
 """Rooms that mutants are drawn from."""
@@ -47,9 +47,6 @@ PASSED = (0, 5)
 EXECUTING = "tests that execute it"
 OTHERS = "all other tests"
 """Stages of a verdict, by the test files that run."""
-
-Given = TypeVar("Given")
-Answer = TypeVar("Answer")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -113,7 +110,7 @@ def measured_files(base: Checkout, kept: KeptLines, processes: Processes, jobs: 
     tests = sorted((base.repository / "tests").rglob("test_*.py"))
     names = [path.relative_to(base.repository).as_posix() for path in tests]
     missing = [name for name in names if name not in found]
-    for measured in _in_parallel(lambda name: _measure(base, name), missing, processes, jobs):
+    for measured in processes.in_parallel(lambda name: _measure(base, name), missing, jobs):
         kept.add(asdict(measured))
         found[measured.file] = measured
         word = "passes" if measured.passes else "FAILS WITHOUT A MUTANT, left out"
@@ -177,25 +174,11 @@ def verdicts(
     told = [Verdict(**{**line, "mutant": Mutant(**line["mutant"])}) for line in kept.read()]
     found = {verdict.mutant: verdict for verdict in told if verdict.stage == stage}
     missing = [site for site in sites if site.mutant not in found]
-    for verdict in _in_parallel(judge, missing, processes, jobs):
+    for verdict in processes.in_parallel(judge, missing, jobs):
         kept.add(asdict(verdict))
         found[verdict.mutant] = verdict
         _say(str(verdict))
     return [found[site.mutant] for site in sites]
-
-
-def _in_parallel(
-    function: Callable[[Given], Answer], given: Sequence[Given], processes: Processes, jobs: int
-) -> Iterator[Answer]:
-    """Yield the answers as they come; a stop ends the processes that work on the others."""
-    with ThreadPoolExecutor(jobs) as pool:
-        try:
-            for done in as_completed([pool.submit(function, each) for each in given]):
-                yield done.result()
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            processes.stop()
-            raise
 
 
 def draw(sites: Sequence[Site], count: int, seed: int) -> list[Site]:

@@ -9,15 +9,14 @@ our PPO train by examples/learners/sb3.py, in the virtual environment of `make t
 """
 
 import argparse
-import os
-import subprocess
+import signal
 import sys
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal, get_args
 
+from benchmarks.processes import Processes
 from springfoot.agents.policies.baselines import constant
 from springfoot.agents.training import Engine, train_missing
 from springfoot.agents.training.config import processors, task_training
@@ -89,6 +88,7 @@ def train_others(learner: Learner, runs: Sequence[Run], timesteps: int) -> dict[
     if not python.is_file():
         sys.exit(f"no virtual environment {LEARNERS_VENV}; make benchmark makes it")
     files = {run: RUNS / run[0] / f"{label_of(learner, timesteps, run[1])}.safetensors" for run in runs}
+    processes = Processes()
 
     def train(run: Run) -> None:
         """Train one run in a process of its own, unless its policy is there."""
@@ -99,14 +99,13 @@ def train_others(learner: Learner, runs: Sequence[Run], timesteps: int) -> dict[
         part = out.with_suffix(".part.safetensors")
         words = ["--algorithm", learner.removeprefix("sb3-"), "--task", task, "--seed", str(seed)]
         words += ["--timesteps", str(timesteps), "--out", str(part)]
-        with out.with_suffix(".log").open("w") as log:
-            own = os.environ | {"OMP_NUM_THREADS": "1"}
-            subprocess.run([python, SB3_EXAMPLE, *words], check=True, stdout=log, stderr=log, env=own)
+        done = processes.run([python, SB3_EXAMPLE, *words], Path.cwd())
+        if done.code != 0:
+            sys.exit(f"{task}, {learner}, seed {seed} failed:\n{done.output}")
         part.rename(out)
-        print(f"{task}, {learner}, seed {seed}: trained", flush=True)
+        print(f"{task}, {learner}, seed {seed}: {done.output.strip()}", flush=True)
 
-    with ThreadPoolExecutor(processors()) as pool:
-        list(pool.map(train, runs))
+    list(processes.in_parallel(train, list(runs), processors()))
     return {run: str(file) for run, file in files.items()}
 
 
@@ -146,4 +145,8 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        main()
+    except KeyboardInterrupt:
+        sys.exit("stopped; the same command goes on")

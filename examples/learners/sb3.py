@@ -4,6 +4,7 @@ python examples/learners/sb3.py --algorithm ppo --out sb3.safetensors
 Tried with stable-baselines3 2.9.2 and sb3-contrib 2.9.2.
 """
 
+import time
 from importlib import import_module
 from typing import Any, Literal
 
@@ -43,6 +44,7 @@ def main(
     if timesteps:
         model.learn(timesteps)
     save_policy(out, policy_from_sb3(model, ignore_unvaried=True))  # without body and speed where neither varied
+    print(f"{out}: {timesteps:,} steps, {time.process_time():.0f} s of a processor")
 
 
 if __name__ == "__main__":

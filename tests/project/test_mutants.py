@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.checkout import Processes
 from benchmarks.executed_lines import FOLDER, REPOSITORY
 from benchmarks.mutants import EXECUTING, OTHERS, KeptLines, MeasuredFile, Verdict, draw, read_mutants, verdicts
 from benchmarks.mutation import find, sites_of
+from benchmarks.processes import Processes
 
 ROOT = Path(__file__).parents[2]
 SOURCE = '''\
@@ -125,12 +125,23 @@ def test_kept_verdicts_are_not_asked_for_again(tmp_path):
     assert judged == sites[:1]
 
 
-def test_a_stop_and_a_limit_end_a_process(tmp_path):
+def test_a_stop_a_limit_and_a_failure_beside_it_end_a_process(tmp_path):
     processes = Processes()
     sleep = [sys.executable, "-c", "import time; print('begun', flush=True); time.sleep(600)"]
     done = processes.run(sleep, tmp_path, limit=2.0)
     assert done.timed_out and done.code != 0
-    processes.stop()
+    ended = []
+
+    def sleep_or_fail(sleeps):
+        if not sleeps:
+            sys.exit("failed")
+        with pytest.raises(KeyboardInterrupt):
+            processes.run(sleep, tmp_path)
+        ended.append("stopped")
+
+    with pytest.raises(SystemExit, match="failed"):
+        list(processes.in_parallel(sleep_or_fail, [True, False], 2))
+    assert ended == ["stopped"]
     with pytest.raises(KeyboardInterrupt):
         processes.run(sleep, tmp_path)
 
