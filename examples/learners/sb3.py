@@ -44,7 +44,7 @@ def main(
     if timesteps:
         model.learn(timesteps)
     save_policy(out, policy_from_sb3(model, ignore_unvaried=True))  # without body and speed where neither varied
-    print(f"{out}: {timesteps:,} steps, {time.process_time():.0f} s of a processor")
+    print(f"{timesteps:,} steps took {time.process_time():.0f} s of a processor")
 
 
 if __name__ == "__main__":
