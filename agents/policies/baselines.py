@@ -45,14 +45,15 @@ def leg_phase(observation: NDArray) -> NDArray:
 
 
 def constant(settings: BipedSettings, stiffness: ArrayLike = CONSTANT_STIFFNESS) -> PolicyFunction:
-    """Return the policy that always sets the same K of ankle and toe, at both legs and every phase.
+    """Return the policy that always sets the same K of ankle and toe, at every phase.
 
-    `stiffness` (ankle, toe) [N m/rad] is that of a body of 1.70 m and 63 kg, and is scaled to the body of `settings`.
+    `stiffness` [N m/rad], (ankle, toe) of both legs or (side, (ankle, toe)), is that of a body of 1.70 m and 63 kg, and
+    is scaled to the body of `settings`.
     """
     body = body_of(settings)
     require_absolute(settings)
-    scaled = np.asarray(stiffness, float) * body.stiffness_scale
-    action = np.tile(action_of(scaled, settings, body).astype(np.float32), len(SIDES))  # the same for both legs
+    scaled = np.broadcast_to(np.asarray(stiffness, float) * body.stiffness_scale, (len(SIDES), 2))
+    action = action_of(scaled, settings, body).astype(np.float32).ravel()
     return lambda observation: np.tile(action, (len(observation), 1))
 
 
@@ -138,8 +139,9 @@ def require_absolute(settings: BipedSettings) -> None:
 
 
 BASELINES = ("untrained", "random", "constant", "schedule", "quasi_stiffness", "thesis", "thesis_printed")
-"""Names of the baselines. `constant:ANKLE,TOE` is a constant of other stiffness [N m/rad], `schedule:FACTOR` the
-schedule times a factor."""
+"""Names of the baselines. `constant:ANKLE,TOE` is a constant of other stiffness [N m/rad],
+`constant:ANKLE,TOE,ANKLE,TOE` one of the left leg and one of the right, `schedule:FACTOR` the schedule times a
+factor."""
 FROZEN = "frozen"
 """`frozen:POLICY` is the mean stiffness of a trained policy over the stride, played open loop
 (`springfoot.evaluation.recording.open_loop`)."""
@@ -152,7 +154,7 @@ SWINGS = {"thesis": THESIS_SWING, "thesis_printed": PRINTED_SWING}
 def baseline(name: str, settings: BipedSettings, seed: int = 0) -> PolicyFunction:
     """Return the policy of a baseline for the environment of `settings`; `seed` is that of `random`.
 
-    `name` is one of `BASELINES`, or `constant:ANKLE,TOE` or `schedule:FACTOR`. Raises `SpringfootError` for any other,
+    `name` is one of `BASELINES`, alone or with numbers, as they stand there. Raises `SpringfootError` for any other,
     and for settings in which a policy acts on more than stiffness.
     """
     kind, colon, numbers = name.partition(":")
@@ -219,13 +221,15 @@ def _factor_from(text: str) -> float:
     return factor
 
 
-def _stiffness_from(text: str) -> tuple[float, float]:
-    """Return the stiffnesses [N m/rad] of `constant:ANKLE,TOE` from their text; raise `SpringfootError` unless both are
-    positive."""
+def _stiffness_from(text: str) -> NDArray:
+    """Return the stiffnesses (legs, (ankle, toe)) [N m/rad] of `constant:` from their text, of one leg for both or of
+    left and right; raise `SpringfootError` unless all are positive."""
     try:
-        ankle, toe = map(float, text.split(","))
+        values = np.array([float(word) for word in text.split(",")])
     except ValueError:
-        ankle = toe = nan
-    if not (0 < ankle < inf and 0 < toe < inf):
-        raise SpringfootError(f"constant takes two positive stiffnesses, as in constant:300,40, got {text!r}")
-    return ankle, toe
+        values = np.array([])
+    if len(values) not in (2, 4) or not np.all((values > 0) & (values < inf)):
+        raise SpringfootError(
+            f"constant takes two positive stiffnesses, as in constant:300,40, or four, left and right, got {text!r}"
+        )
+    return values.reshape(-1, 2)

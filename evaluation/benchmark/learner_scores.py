@@ -15,7 +15,7 @@ from springfoot.arrays import NDArray
 
 from .judged import JudgedRow
 
-_RESAMPLES = 2000
+_RESAMPLES = 50_000
 """Resamples of the bootstrap, as in the paper's library, rliable."""
 RANDOM, CONSTANT = "random", "constant"
 """Baselines at scores 0 and 1."""
@@ -67,12 +67,16 @@ def interquartile_mean(*samples: NDArray, axis: int = -1) -> NDArray:
 
 def interval(samples: Sequence[NDArray]) -> tuple[float, float, float]:
     """Return the interquartile mean of samples (S,), each of one task, and its 95 % interval: each task's trainings
-    are drawn anew among themselves. Of a single value all three are that value."""
+    are drawn anew among themselves, whatever their order. Of a single value all three are that value."""
     middle = float(interquartile_mean(*samples))
     if all(len(sample) < 2 for sample in samples):
         return middle, middle, middle
     found = bootstrap(
-        samples, interquartile_mean, n_resamples=_RESAMPLES, method="percentile", rng=np.random.default_rng(0)
+        [np.sort(sample) for sample in samples],
+        interquartile_mean,
+        n_resamples=_RESAMPLES,
+        method="percentile",
+        rng=np.random.default_rng(0),
     )
     return middle, float(found.confidence_interval.low), float(found.confidence_interval.high)
 

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from springfoot.agents.policies.baselines import BASELINES
 from springfoot.agents.policies.policy import find_policy
 from springfoot.errors import SpringfootError, printable, quoted
 from springfoot.files.json_file import object_with_digest, read_object
@@ -41,6 +42,8 @@ LARGEST_RETURN = 1e6
 """Largest magnitude of an episode's return [-]; chosen, a hundred times the highest that weights allow."""
 _NAME = re.compile(r"(?:[^\W_]|[ ,.:()+-])+")
 """Letters of a submission's name: none that Markdown or HTML reads."""
+_BASELINE = re.compile(rf"\s*(best\s+)?({'|'.join(BASELINES)})\b", re.IGNORECASE)
+"""Begin of a baseline's name, which no other submission may have."""
 _PACKAGES = ("springfoot", "mujoco", "numpy", "gymnasium")
 
 
@@ -80,7 +83,7 @@ def submit(policy: str, task: str, name: str, out: Path | None, threads: int) ->
     written, for a policy that the task does not take.
     """
     settings_of_task(task)  # an unknown task first
-    _require_name(name)
+    _require_name(name, policy)
     policy_on_task(policy, task)  # one that the task does not take
     content = None if is_baseline(policy) else read_bytes(find_policy(policy), MOST_POLICY_BYTES)
     digest = _digest_of(policy, content)
@@ -117,11 +120,12 @@ def read_submission(folder: Path) -> Submission:
         name, task, policy, digest = (str(values[key]) for key in ("name", "task", "policy", "policy_digest"))
         returns = np.array(values["returns"], float)
         falls = list(values["fell"])
+        mean, fallen = float(values["return_mean"]), int(values["falls"])
     except (KeyError, TypeError, ValueError, OverflowError) as error:
         fault = f"has no {error}" if isinstance(error, KeyError) else f"has no numbers where it should: {error}"
         raise SpringfootError(f"{path} is no submission: it {printable(fault)}") from None
     try:
-        _require_name(name)
+        _require_name(name, policy)
         settings_of_task(task)
     except SpringfootError as error:
         raise SpringfootError(f"{path} is no submission: {error}") from None
@@ -129,6 +133,8 @@ def read_submission(folder: Path) -> Submission:
         raise SpringfootError(f"{path} is no submission: it needs {EPISODES} returns, and falls of 0 or 1")
     if not np.all(np.abs(returns) <= LARGEST_RETURN):
         raise SpringfootError(f"{path} is no submission: a return must be within ±{LARGEST_RETURN:g}")
+    if not np.isclose(mean, returns.mean(), rtol=SAME) or fallen != sum(falls):
+        raise SpringfootError(f"{path} is no submission: return_mean and falls must be those of its episodes")
     if policy == POLICY:
         policy = str(folder / POLICY)
         found = _digest_of(policy, read_bytes(Path(policy), MOST_POLICY_BYTES))
@@ -175,9 +181,12 @@ def repeats(walks: TaskWalks, told: TaskWalks, within: float) -> bool:
     return bool(near.all() and np.array_equal(walks.fell, told.fell))
 
 
-def _require_name(name: str) -> None:
-    """Raise `SpringfootError` unless a submission's name fits into a cell of a table."""
+def _require_name(name: str, policy: str) -> None:
+    """Raise `SpringfootError` unless a submission's name fits into a cell of a table, and begins with a baseline's only
+    if the policy is one."""
     if not name.strip() or len(name) > MOST_NAME_LETTERS or not _NAME.fullmatch(name):
         raise SpringfootError(
             f"name must be 1 to {MOST_NAME_LETTERS} letters, digits, spaces and ,.:()+-, got {quoted(name)}"
         )
+    if not is_baseline(policy) and _BASELINE.match(name):
+        raise SpringfootError(f"name must not begin with a baseline's, {', '.join(BASELINES)}, got {quoted(name)}")

@@ -59,6 +59,11 @@ def test_constant_of_other_stiffness():
     assert stiffness_of(action.reshape(2, 2), settings, Body()) == pytest.approx(
         np.array([[450.0, 30.0]] * 2), rel=1e-5
     )
+    action = baseline("constant:450,30,200,60", settings)(np.zeros((3, len(OBSERVATION))))
+    assert action.shape == (3, 4)
+    assert stiffness_of(action.reshape(3, 2, 2), settings, Body()) == pytest.approx(
+        np.array([[[450.0, 30.0], [200.0, 60.0]]] * 3), rel=1e-5
+    )
 
 
 def test_schedule_sets_the_stiffness_of_the_leg_tuning():
@@ -162,6 +167,8 @@ def test_stiffness_in_residual_mode_is_refused():
         "standing",
         "constant:1",
         "constant:1,-2",
+        "constant:1,2,3",
+        "constant:1,2,3,inf",
         "constant:a,b",
         "constant:nan,3",
         "random:3",

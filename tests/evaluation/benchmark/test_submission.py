@@ -36,10 +36,10 @@ FEW = 25
 """Episodes of tests that walk submissions: every episode is one by itself, in a batch of any size."""
 
 
-def walk_few(monkeypatch):
-    """Let submissions have `FEW` episodes from now on, the first of the 100."""
+def walk_few(monkeypatch, episodes=FEW):
+    """Let submissions have `episodes` from now on, the first of the 100."""
     for module in ("judged", "leaderboard", "submission", "task_walks"):
-        monkeypatch.setattr(f"springfoot.evaluation.benchmark.{module}.EPISODES", FEW)
+        monkeypatch.setattr(f"springfoot.evaluation.benchmark.{module}.EPISODES", episodes)
 
 
 @pytest.fixture(scope="module")
@@ -128,13 +128,14 @@ def test_a_policy_whose_action_means_something_else_is_refused(setting, value, t
 
 
 @pytest.mark.slow
-def test_a_committed_submission_repeats(monkeypatch):
-    folder = REPOSITORY / "benchmarks" / "submissions" / "Slopes-v0" / "constant"
-    submission = benchmark.read_submission(folder)
-    walk_few(monkeypatch)
+@pytest.mark.parametrize("task", [f"{name}-{VERSION}" for name in STIFFNESS_TASKS])
+def test_committed_springs_repeat(monkeypatch, task):
+    submission = benchmark.read_submission(REPOSITORY / "benchmarks" / "submissions" / task / "constant")
+    falls = submission.walks.fell.any()
+    walk_few(monkeypatch, episodes := max(5, 1 + int(submission.walks.fell.argmax())))  # the first fall, too
     repeated = walk_publicly(submission.policy, submission.task, threads=1)
-    assert repeated.returns == pytest.approx(submission.walks.returns[:FEW], rel=benchmark.SAME)
-    assert np.array_equal(repeated.fell, submission.walks.fell[:FEW]) and repeated.fell.any()
+    assert repeated.returns == pytest.approx(submission.walks.returns[:episodes], rel=benchmark.SAME)
+    assert np.array_equal(repeated.fell, submission.walks.fell[:episodes]) and repeated.fell.any() == falls
 
 
 def test_every_committed_judgement_is_of_its_submission_and_of_a_commit():
@@ -211,13 +212,16 @@ def test_a_changed_number_is_refused(submitted, tmp_path):
         ({"returns": [1e308] * 100}, "a return must be within"),
         ({"name": "<script>"}, "name must be 1 to 60 letters"),
         ({"returns": "many"}, "has no numbers where it should"),
-        ({"policy": "../../somewhere.safetensors"}, "allowed are policy.safetensors and baselines"),
-        ({"policy": "os:system"}, "allowed are policy.safetensors and baselines"),
+        ({"policy": "../../somewhere.safetensors", "name": "ours"}, "allowed are policy.safetensors and baselines"),
+        ({"policy": "os:system", "name": "ours"}, "allowed are policy.safetensors and baselines"),
         ({"policy": "constant:1,2"}, "is not the policy that was submitted"),
         ({"name": "a|b"}, "name must be 1 to 60 letters"),
         ({"name": "*a*"}, "bad/submission.json is no submission: name must be 1 to 60 letters"),
         ({"name": "_a_"}, "name must be 1 to 60 letters"),
         ({"fell": ["a"] * 100}, "it needs 100 returns, and falls of 0 or 1"),
+        ({"return_mean": 9e9}, "return_mean and falls must be those of its episodes"),
+        ({"falls": 77}, "return_mean and falls must be those of its episodes"),
+        ({"falls": None}, "has no numbers where it should"),
     ],
 )
 def test_a_bad_submission_is_one_line(submitted, tmp_path, change, message):
@@ -227,6 +231,15 @@ def test_a_bad_submission_is_one_line(submitted, tmp_path, change, message):
     with pytest.raises(SpringfootError, match=message) as caught:
         benchmark.read_submission(folder)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["random", "best constant:400,40", "Schedule, seed 7"])
+def test_a_baseline_s_name_is_a_baseline_s(submitted, tmp_path, name):
+    folder = copied(submitted[0], tmp_path / "named")
+    path = folder / benchmark.SUBMISSION
+    path.write_bytes(object_with_digest({**json.loads(path.read_bytes()), "name": name}))
+    with pytest.raises(SpringfootError, match="name must not begin with a baseline's, untrained, random, constant, "):
+        benchmark.read_submission(folder)
 
 
 @pytest.mark.parametrize(
@@ -282,10 +295,11 @@ def a_judgement(submission):
     return {"task": submission.task, "policy_digest": submission.digest, **numbers}
 
 
-def entered(submission, folder, *, first_return, mean=1.0, drawn=2.0):
-    """Copy a submission into a new folder under the folder's name, judged, with another return in its first episode."""
+def entered(submission, folder, *, factor, mean=1.0, drawn=2.0):
+    """Copy a submission into a new folder under the folder's name, judged, with returns times a factor."""
     values = read_object(copied(submission, folder) / benchmark.SUBMISSION, "submission")
-    values |= {"name": folder.name, "returns": [first_return, *values["returns"][1:]]}
+    returns = [factor * value for value in values["returns"]]
+    values |= {"name": folder.name, "returns": returns, "return_mean": float(np.mean(returns))}
     (folder / benchmark.SUBMISSION).write_bytes(object_with_digest(values))
     means = {"return_mean": mean, "drawn_return_mean": drawn}
     (folder / benchmark.JUDGED).write_bytes(object_with_digest(a_judgement(submission) | means))
@@ -293,7 +307,7 @@ def entered(submission, folder, *, first_return, mean=1.0, drawn=2.0):
 
 def test_a_table_has_eight_rows_and_says_how_many_more_there_are(submitted, tmp_path):
     for place, name in enumerate("abcdefghij"):
-        entered(submitted[1], tmp_path / name, first_return=float(place))
+        entered(submitted[1], tmp_path / name, factor=1.0 + 0.001 * place)
     board = leaderboard(tmp_path)
     assert "\n| h |" in board
     assert "\n| i |" not in board
@@ -308,7 +322,7 @@ def test_trainings_of_one_learner_are_one_entry_with_both_scores(submitted, tmp_
     entries = [("random", "random", 1.0, 0.0), ("springs", "constant:300,40", 3.0, springs_drawn)]
     entries += [(f"ours, seed {seed}", "quasi_stiffness", 4.0 + seed, 8.0 + 2.0 * seed) for seed in (0, 1)]
     for name, policy, mean, drawn_mean in entries:
-        entered(submitted[1], tmp_path / name, first_return=mean, mean=mean, drawn=drawn_mean)
+        entered(submitted[1], tmp_path / name, factor=mean, mean=mean, drawn=drawn_mean)
         own = {"policy": policy, "policy_digest": sha256(policy.encode()).hexdigest()}
         values = read_object(tmp_path / name / benchmark.SUBMISSION, "submission") | own
         (tmp_path / name / benchmark.SUBMISSION).write_bytes(object_with_digest(values))
@@ -327,17 +341,17 @@ def test_trainings_of_one_learner_are_one_entry_with_both_scores(submitted, tmp_
 
 def test_a_table_is_in_the_order_of_returns(submitted, tmp_path):
     for name, mean in (("low", 1.0), ("high", 3.0), ("between", 2.0)):
-        entered(submitted[1], tmp_path / name, first_return=mean, mean=mean)
+        entered(submitted[1], tmp_path / name, factor=mean, mean=mean)
     rows = [line for line in leaderboard(tmp_path).splitlines() if line.startswith("| ")][2:]
     assert [row.split(" | ")[0] for row in rows] == ["| high", "| between", "| low"]
 
 
-def test_an_entry_that_returns_as_another_does_is_refused(submitted, tmp_path):
-    for name in ("copy", "first"):
-        entered(submitted[1], tmp_path / name, first_return=1.0)
+def test_an_entry_that_returns_nearly_as_another_does_is_refused(submitted, tmp_path):
+    for name, factor in (("copy", 1.0 + 1e-5), ("first", 1.0)):
+        entered(submitted[1], tmp_path / name, factor=factor)
     with pytest.raises(SpringfootError) as caught:
         leaderboard(tmp_path)
-    told = f"{tmp_path / 'first'} returns the same in every episode as {tmp_path / 'copy'}: keep one of them"
+    told = f"{tmp_path / 'first'} returns nearly the same as {tmp_path / 'copy'}: keep one of them"
     assert str(caught.value) == told
 
 
