@@ -14,6 +14,7 @@ from springfoot.envs.batch.biped_batch import Biped
 from springfoot.envs.batch.step_result import Tick
 from springfoot.envs.control.stiffness_control import FEET
 from springfoot.envs.physics.model import ANKLE
+from springfoot.envs.settings.feet import MOST_POINTS
 from springfoot.envs.settings.settings import settings_from, settings_to_json
 from springfoot.errors import SpringfootError
 from springfoot.evaluation.report.schedule_tables import states_json, table_of_states
@@ -156,11 +157,19 @@ def foot(**numbers: Any) -> dict[str, Any]:
     return {"kind": "passive", **numbers}
 
 
+@pytest.mark.parametrize("points", [2, MOST_POINTS])
+def test_a_table_has_two_to_a_thousand_points(points):
+    angles = np.linspace(-20.0, 30.0, points)
+    table = [[float(angle), float(-4.0 * angle)] for angle in angles]
+    assert settings_from(left_foot=foot(ankle_table=table)).left_foot.numbers["ankle_table"] == table
+
+
 @pytest.mark.parametrize(
     ("wrong", "text"),
     [
         (foot(ankle_table=[]), "ankle_table must be a list of 2 to 1000 pairs [deg, N m], got []"),
         (foot(ankle_table=[[0, 1]]), "ankle_table must be a list of 2 to 1000 pairs [deg, N m], got [[0, 1]]"),
+        (foot(ankle_table=[[0, -1]] * (MOST_POINTS + 1)), "ankle_table must be a list of 2 to 1000 pairs [deg, N m]"),
         (foot(ankle_table=[[0, 1], [1]]), "ankle_table must be a list of 2 to 1000 pairs [deg, N m]"),
         (foot(toe_table="line"), "toe_table must be a list of 2 to 1000 pairs [deg, N m], got 'line'"),
         (foot(ankle_table=[[0, 9], [0, 1]]), "ankle_table: angles must ascend, got 0 deg after 0 deg"),
