@@ -242,6 +242,8 @@ def test_mean_curves_over_percent_come_back_to_rounding(tmp_path):
         ("stride_time_s", 1050.0, "stride_time must be in [0.4, 4] s, got 1050: ms?"),
         ("step_length_m", 680.0, "step_length must be in [0.05, 2] m, got 680: mm?"),
         ("step_length_m", 68.0, "got 68: cm?"),
+        ("step_length_m", 5.0, "got 5: cm?"),  # the least that is accepted
+        ("stride_time_s", 4000.0, "got 4000: ms?"),  # the largest
         ("toe_off_percent", 0.62, "[0.3, 0.9] of the stride, got 0.0062: a fraction, where percent must be?"),
         ("stride_time_s", 9.0, "stride_time must be in [0.4, 4] s, got 9"),
     ],
