@@ -114,11 +114,11 @@ def policies() -> str:
 def benchmark() -> str:
     """Return the page of the leaderboard."""
     words = (
-        "Submissions to the frozen tasks, each repeated by `springfoot judge`; at most eight a task. "
-        "[The benchmark](benchmark.md) says what they are and how they are scored. *Drawn*: seeds and bodies that "
-        "follow from the policy's digest. Trainings that differ in the seed alone are one entry: the interquartile "
-        "mean of their returns, with a 95 % bootstrap interval; of all tasks, that of all their scores together. "
-        "`make benchmark` makes the entries of this project."
+        "Submissions to the frozen tasks, each repeated by `springfoot judge`; at most eight a task, random stiffness "
+        "and the best constant springs among them. [The benchmark](benchmark.md) says what they are and how they are "
+        "scored. *Drawn*: seeds and bodies that follow from the policy's digest. Trainings that differ in the seed "
+        "alone are one entry: the interquartile mean of their returns, with a 95 % bootstrap interval; of all tasks, "
+        "that of all their scores together. `make benchmark` makes the entries of this project."
     )
     return f"# Leaderboard\n\n{words}\n\n{leaderboard(SUBMISSIONS)}"
 

@@ -14,7 +14,7 @@ from springfoot.files.markdown import MISSING, table
 from springfoot.tasks import STIFFNESS_TASKS, TASKS, VERSION
 
 from .judged import JudgedRow, judged_rows
-from .learner_scores import SCHEDULE, LearnerScores, interval, interval_text, learner_scores
+from .learner_scores import CONSTANT, RANDOM, SCHEDULE, LearnerScores, interval, interval_text, learner_scores
 from .task_walks import EPISODES
 
 MOST_ROWS = 8
@@ -25,7 +25,7 @@ _OF_MAKE = re.compile(r"(?P<learner>.+)-(?P<timesteps>\d+)-seed-\d+")
 
 def leaderboard(folder: Path) -> str:
     """Return Markdown of the judged submissions below a folder: the scores of learners, then a section for each task
-    that has submissions, its best `MOST_ROWS` entries."""
+    that has submissions."""
     rows = judged_rows(folder)
     public, drawn = learner_scores(rows), learner_scores(rows, "drawn_return_mean")
     parts = [text] if (text := _scores_section(public, drawn)) else []
@@ -37,11 +37,21 @@ def leaderboard(folder: Path) -> str:
             if row.submission.task == task:
                 entries.setdefault(row.entry, []).append(row)
         if entries:
-            best = sorted(entries.items(), key=lambda item: -np.mean([row.return_mean for row in item[1]]))
-            parts.append(f"## {task}\n\n{table(head, [_cells(name, own) for name, own in best[:MOST_ROWS]])}")
-            if len(best) > MOST_ROWS:
-                parts.append(f"{len(best) - MOST_ROWS} more are not shown.")
+            shown = _shown(entries)
+            parts.append(f"## {task}\n\n{table(head, [_cells(name, entries[name]) for name in shown])}")
+            if len(entries) > len(shown):
+                parts.append(f"{len(entries) - len(shown)} more are not shown.")
     return "\n\n".join(parts)
+
+
+def _shown(entries: Mapping[str, Sequence[JudgedRow]]) -> list[str]:
+    """Return the names of a task's best `MOST_ROWS` entries, best first; the best of random stiffness and of constant
+    springs are always among them."""
+    best = sorted(entries, key=lambda name: -np.mean([row.return_mean for row in entries[name]]))
+    kinds = {name: entries[name][0].submission.policy.partition(":")[0] for name in best}
+    ends = {next(name for name in best if kinds[name] == kind) for kind in (RANDOM, CONSTANT) if kind in kinds.values()}
+    kept = ends.union([name for name in best if name not in ends][: MOST_ROWS - len(ends)])
+    return [name for name in best if name in kept]
 
 
 def _cells(name: str, rows: Sequence[JudgedRow]) -> list[str]:

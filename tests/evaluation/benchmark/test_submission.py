@@ -305,6 +305,13 @@ def entered(submission, folder, *, factor, mean=1.0, drawn=2.0):
     (folder / benchmark.JUDGED).write_bytes(object_with_digest(a_judgement(submission) | means))
 
 
+def named(folder, policy):
+    """Make the submission in `folder`, and its judgement, that of a baseline's name."""
+    own = {"policy": policy, "policy_digest": sha256(policy.encode()).hexdigest()}
+    for path, kind in ((folder / benchmark.SUBMISSION, "submission"), (folder / benchmark.JUDGED, "judgement")):
+        path.write_bytes(object_with_digest(read_object(path, kind) | own))
+
+
 def test_a_table_has_eight_rows_and_says_how_many_more_there_are(submitted, tmp_path):
     for place, name in enumerate("abcdefghij"):
         entered(submitted[1], tmp_path / name, factor=1.0 + 0.001 * place)
@@ -312,6 +319,19 @@ def test_a_table_has_eight_rows_and_says_how_many_more_there_are(submitted, tmp_
     assert "\n| h |" in board
     assert "\n| i |" not in board
     assert board.endswith("2 more are not shown.")
+
+
+def test_the_ends_of_the_score_are_always_in_the_table(submitted, tmp_path):
+    for place, name in enumerate("abcdefghij"):
+        entered(submitted[1], tmp_path / name, factor=1.0 + 0.001 * place)
+        named(tmp_path / name, "quasi_stiffness")
+    for place, policy in enumerate(("constant:300,40", "random", "constant:200,40")):
+        entered(submitted[1], tmp_path / policy, factor=0.5 + 0.1 * place, mean=-1.0 - place)
+        named(tmp_path / policy, policy)
+    board = leaderboard(tmp_path)
+    rows = [line.split(" | ")[0] for line in board.splitlines() if line.startswith("| ")][2:]
+    assert rows == ["| a", "| b", "| c", "| d", "| e", "| f", "| constant:300,40", "| random"]
+    assert board.endswith("5 more are not shown.")
 
 
 @pytest.mark.parametrize(
@@ -323,11 +343,7 @@ def test_trainings_of_one_learner_are_one_entry_with_both_scores(submitted, tmp_
     entries += [(f"ours, seed {seed}", "quasi_stiffness", 4.0 + seed, 8.0 + 2.0 * seed) for seed in (0, 1)]
     for name, policy, mean, drawn_mean in entries:
         entered(submitted[1], tmp_path / name, factor=mean, mean=mean, drawn=drawn_mean)
-        own = {"policy": policy, "policy_digest": sha256(policy.encode()).hexdigest()}
-        values = read_object(tmp_path / name / benchmark.SUBMISSION, "submission") | own
-        (tmp_path / name / benchmark.SUBMISSION).write_bytes(object_with_digest(values))
-        judged = read_object(tmp_path / name / benchmark.JUDGED, "judgement") | own
-        (tmp_path / name / benchmark.JUDGED).write_bytes(object_with_digest(judged))
+        named(tmp_path / name, policy)
     for seed in (0, 1):
         (tmp_path / f"ours, seed {seed}").rename(tmp_path / f"sac-800-seed-{seed}")
     board = leaderboard(tmp_path)
