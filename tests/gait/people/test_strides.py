@@ -1,5 +1,7 @@
 """Common samples of several trials, and the method that finds strides."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -39,6 +41,13 @@ def test_strides_are_those_of_the_first_method_that_finds_enough(landings, strid
     assert len(found) == strides
     delay = found[0, 0] % 1.0 - 0.25  # the force crosses its threshold after the event's time
     assert (delay > 1e-3) == by_force
+
+
+def test_a_stride_may_end_with_the_last_sample_and_not_after_it():
+    walk = loaded_walk(2)  # strides by the events of the file, the sixth until 6.25 s
+    for samples, strides in ((626, 6), (625, 5)):
+        shorter = replace(walk, legs={"left": {name: curve[:samples] for name, curve in walk.legs["left"].items()}})
+        assert len(cut_strides(shorter)[0]) == strides
 
 
 def test_the_edge_of_a_plate_takes_all_force_at_once_and_an_impact_a_part():
