@@ -41,21 +41,39 @@ def started(num: int, threads: int = 1, body: Body | None = None) -> tuple[Simul
     return simulation, random
 
 
-@pytest.mark.parametrize("body", [Body(), Body(1.55, 90.0), Body(1.7, 63.0, 1.06, 0.93, 0.3)])
-def test_kinematics_agree_with_mujoco(body):
+@pytest.mark.parametrize(
+    ("body", "ground"),
+    [
+        (Body(), (0.0, 0.0, 0.0)),
+        (Body(1.55, 90.0), (0.0, 0.0, 0.0)),
+        (Body(1.7, 63.0, 1.06, 0.93, 0.3), (0.0, 0.0, 0.0)),
+        (Body(), (0.08, 0.004, -0.003)),
+    ],
+)
+def test_kinematics_agree_with_mujoco(body, ground):
     simulation, random = started(4, body=body)
+    simulation.arrays.bodies["ground"] = ground
     m = advance(simulation, random.uniform(5, 300, (4, *LEGS)), random.normal(size=(4, *LEGS)))
+    slope = ground[0]
+
+    def from_ground(forward_and_up: NDArray, height: float = 0.0) -> NDArray:
+        """Return a place or a velocity with its upward part relative to the ground below."""
+        return forward_and_up - [0, slope * forward_and_up[0] + height]
+
     for index in range(4):
         data = simulation.data(index)
         mujoco.mj_subtreeVel(simulation.model, data)
-        np.testing.assert_allclose(m.com[index], data.subtree_com[0][[0, 2]], atol=1e-12)
-        np.testing.assert_allclose(m.com_velocity[index], data.subtree_linvel[0][[0, 2]], atol=1e-12)
+        np.testing.assert_allclose(m.com[index], from_ground(data.subtree_com[0][[0, 2]]), atol=1e-12)
+        np.testing.assert_allclose(m.com_velocity[index], from_ground(data.subtree_linvel[0][[0, 2]]), atol=1e-12)
+        np.testing.assert_allclose(m.base[index, :2], from_ground(data.qpos[:2]), atol=1e-12)
+        np.testing.assert_allclose(m.base_velocity[index, :2], from_ground(data.qvel[:2]), atol=1e-12)
         for s, side in enumerate(SIDES):
-            np.testing.assert_allclose(m.ankle[index, s], data.body(f"foot_{side}").xpos[[0, 2]], atol=1e-12)
+            ankle = from_ground(data.body(f"foot_{side}").xpos[[0, 2]])
+            np.testing.assert_allclose(m.ankle[index, s], ankle, atol=1e-12)
             for c, contact in enumerate(CONTACTS):
                 geom = simulation.model.geom(geom_name(contact, side)).id
                 lowest = data.geom_xpos[geom][[0, 2]] - [0, simulation.model.geom_size[geom, 0]]
-                np.testing.assert_allclose(m.contact[index, s, c], lowest, atol=1e-12)
+                np.testing.assert_allclose(m.contact[index, s, c], from_ground(lowest, ground[1 + s]), atol=1e-12)
 
 
 def test_joint_torque_is_the_spring_equation_up_to_the_limit():
