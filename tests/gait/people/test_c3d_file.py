@@ -160,6 +160,20 @@ def test_a_damaged_file_is_refused_in_one_line(tmp_path, change, words):
     assert "\n" not in str(caught.value)
 
 
+def test_a_recording_may_end_with_its_last_number(tmp_path):
+    path = laboratory(tmp_path / "lab.c3d", events=True)
+    whole = path.read_bytes()
+    path.write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(SpringfootError, match="is cut short") as caught:
+        read_gait(path)
+    last = int(str(caught.value).split()[-2])  # "193024 of 385536 bytes"
+    path.write_bytes(whole[:last])
+    assert read_gait(path).strides == read_gait(laboratory(tmp_path / "whole.c3d", events=True)).strides
+    path.write_bytes(whole[: last - 1])
+    with pytest.raises(SpringfootError, match=f"lab.c3d is cut short: {last - 1} of {last} bytes"):
+        read_gait(path)
+
+
 def test_bytes_that_crash_or_fill_the_library_end_a_child_and_not_us(tmp_path, monkeypatch):
     monkeypatch.setitem(globals(), "SECONDS", 2.5)
     path = laboratory(tmp_path / "lab.c3d", events=True)
