@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from springfoot.envs.physics.contact import CONTACTS, geom_name
 from springfoot.envs.physics.measurement import Measurement, measure_bodies
-from springfoot.envs.physics.model import JOINTS, SIDES, build_model, damping_times, torque_limits
+from springfoot.envs.physics.model import JOINTS, SIDES, TOE, build_model, damping_times, torque_limits
 from springfoot.envs.physics.simulation import Simulation
 from springfoot.envs.physics.timing import PHYSICS_STEPS_PER_WINDOW
 from springfoot.errors import SpringfootError
@@ -92,6 +92,17 @@ def test_joint_torque_is_the_spring_equation_up_to_the_limit():
         np.testing.assert_allclose(torque[below[index]], spring[index][below[index]], rtol=0, atol=1e-9)
         np.testing.assert_allclose(torque, np.clip(spring[index], -limit, limit), rtol=0, atol=1e-9)
         np.testing.assert_allclose(m.torque[index], torque, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("side", range(2))
+def test_muscles_without_stiffness_bear_nothing(side):
+    simulation, random = started(1)
+    stiffness = random.uniform(50, 300, (1, *LEGS))
+    stiffness[0, side, TOE] = 0.0
+    advance(simulation, stiffness, stiffness * random.normal(size=(1, *LEGS)))
+    moment = simulation.arrays.bodies["muscles"]["moment"][0, 0]
+    assert moment[side, TOE] == 0.0
+    assert np.count_nonzero(moment) == moment.size - 1
 
 
 def test_force_is_the_mean_over_the_windows_physics_steps():
