@@ -14,7 +14,16 @@ from springfoot.files.markdown import MISSING, table
 from springfoot.tasks import STIFFNESS_TASKS, TASKS, VERSION
 
 from .judged import JudgedRow, judged_rows
-from .learner_scores import CONSTANT, RANDOM, SCHEDULE, LearnerScores, interval, interval_text, learner_scores
+from .learner_scores import (
+    CONSTANT,
+    RANDOM,
+    SCHEDULE,
+    SEEDS,
+    LearnerScores,
+    interval,
+    interval_text,
+    learner_scores,
+)
 from .task_walks import EPISODES
 
 MOST_ROWS = 8
@@ -87,25 +96,33 @@ def _scores_section(public: LearnerScores, drawn: LearnerScores) -> str:
 
 
 def _not_run(rows: Sequence[JudgedRow], scores: LearnerScores) -> str:
-    """Return a Markdown list of the commands that run the learners of `make benchmark` on the tasks without a score of
-    theirs; empty if each has one on all."""
+    """Return a Markdown list of the commands that run the learners of `make benchmark` on the tasks where they have
+    fewer than `SEEDS` trainings; empty if there are none."""
     lines = []
     for learner, by_task in scores.items():
-        left = [task for name in STIFFNESS_TASKS if (task := f"{name}-{VERSION}") not in by_task]
+        tasks = [f"{name}-{VERSION}" for name in STIFFNESS_TASKS]
+        left = [task for task in tasks if len(by_task.get(task, ())) < SEEDS]
         folders = [row.submission.folder.name for row in rows if row.entry == learner]
         made = next(filter(None, map(_OF_MAKE.fullmatch, folders)), None)
         if left and made:
             flags = f"--learners {made['learner']} --timesteps {made['timesteps']} --tasks {' '.join(left)}"
             lines.append(f'- {learner}: `make benchmark BENCHMARK="{flags}"`')
-    return "\n".join(["Commands of the cells that are not run:", "", *lines]) if lines else ""
+    return "\n".join([f"Commands of the cells that are not run with {SEEDS} seeds:", "", *lines]) if lines else ""
 
 
 def _scores_table(head: str, tasks: Sequence[str], scores: LearnerScores) -> str:
-    """Return the Markdown table of scores: a row for each of `tasks`, and one for all of them together."""
-    lines = []
-    for task in tasks:
-        own = (by_task.get(task) for by_task in scores.values())
-        lines.append([task, *("not run" if each is None else interval_text([each], ".2f") for each in own)])
+    """Return the Markdown table of scores: a row for each of `tasks`, and one for all of them together. Where a learner
+    has fewer than `SEEDS` trainings, their number is told."""
+
+    def cell(learner: str, task: str) -> str:
+        """Return the text of a learner's scores on a task."""
+        found = scores[learner].get(task)
+        if found is None:
+            return "not run"
+        is_whole = learner == SCHEDULE or len(found) >= SEEDS
+        return interval_text([found], ".2f") + ("" if is_whole else f", {len(found)} seeds")
+
+    lines = [[task, *(cell(learner, task) for learner in scores)] for task in tasks]
     whole = [[by_task[task] for task in tasks] if {*tasks} <= by_task.keys() else None for by_task in scores.values()]
     lines.append(["all", *(MISSING if each is None else interval_text(each, ".2f") for each in whole)])
     return table([head, *scores], lines)
@@ -113,5 +130,6 @@ def _scores_table(head: str, tasks: Sequence[str], scores: LearnerScores) -> str
 
 def _beats_springs(task: str, *scores: Mapping[str, NDArray]) -> bool:
     """Return whether a learner's score on a task lies above 1 with all of its interval, by each of `scores`, task ->
-    scores."""
-    return all(task in by_task and interval([by_task[task]])[1] > 1.0 for by_task in scores)
+    scores of `SEEDS` trainings or more."""
+    found = (by_task.get(task) for by_task in scores)
+    return all(own is not None and len(own) >= SEEDS and interval([own])[1] > 1.0 for own in found)

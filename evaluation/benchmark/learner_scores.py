@@ -14,7 +14,10 @@ from scipy.stats import bootstrap, trim_mean
 from springfoot.arrays import NDArray
 
 from .judged import JudgedRow
+from .task_walks import is_baseline
 
+SEEDS = 5
+"""Trainings of an entry that is whole; chosen. One with fewer is told."""
 _RESAMPLES = 50_000
 """Resamples of the bootstrap, as in the paper's library, rliable."""
 RANDOM, CONSTANT = "random", "constant"
@@ -39,13 +42,15 @@ def baseline_returns(rows: Sequence[JudgedRow], of: Return = "return_mean") -> d
 
 
 def learner_scores(rows: Sequence[JudgedRow], of: Return = "return_mean") -> LearnerScores:
-    """Return the scores of `SCHEDULE` and of the entries with several trainings, on the tasks that have both
-    baselines, with different returns."""
+    """Return the scores of `SCHEDULE`, and of the entries with several trainings of something that learns, on the tasks
+    that have both ends of the score, with different returns."""
     ends = baseline_returns(rows, of)
     both = {task for _, task in ends if {(RANDOM, task), (CONSTANT, task)} <= ends.keys()}
     tasks = {task for task in both if ends[RANDOM, task] != ends[CONSTANT, task]}
     returns: dict[str, dict[str, list[float]]] = {}
     for row in rows:
+        if is_baseline(row.submission.policy) and row.submission.policy != SCHEDULE:
+            continue
         entry = SCHEDULE if row.submission.policy == SCHEDULE else row.entry
         returns.setdefault(entry, {}).setdefault(row.submission.task, []).append(getattr(row, of))
     scores = {}

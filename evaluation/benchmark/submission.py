@@ -40,10 +40,10 @@ SAME = 1e-6
 """Largest relative difference of a return that counts as the same on another processor [-]; chosen."""
 LARGEST_RETURN = 1e6
 """Largest magnitude of an episode's return [-]; chosen, a hundred times the highest that weights allow."""
-_NAME = re.compile(r"(?:[^\W_]|[ ,.:()+-])+")
-"""Letters of a submission's name: none that Markdown or HTML reads."""
-_BASELINE = re.compile(rf"\s*(best\s+)?({'|'.join(BASELINES)})\b", re.IGNORECASE)
-"""Begin of a baseline's name, which no other submission may have."""
+_NAME = re.compile(r"[A-Za-z0-9 ,.:()+-]+")
+"""Letters of a submission's name: none that Markdown or HTML reads, and none that looks like another."""
+_BASELINE = re.compile(rf"\s*(?:best\s+)?(?P<baseline>{'|'.join(BASELINES)})\b", re.IGNORECASE)
+"""Begin of a baseline's name: a baseline has its own, and no other submission has one."""
 _PACKAGES = ("springfoot", "mujoco", "numpy", "gymnasium")
 
 
@@ -182,11 +182,16 @@ def repeats(walks: TaskWalks, told: TaskWalks, within: float) -> bool:
 
 
 def _require_name(name: str, policy: str) -> None:
-    """Raise `SpringfootError` unless a submission's name fits into a cell of a table, and begins with a baseline's only
-    if the policy is one."""
+    """Raise `SpringfootError` unless a submission's name fits into a cell of a table, and begins with a baseline's
+    exactly if the policy is that baseline."""
     if not name.strip() or len(name) > MOST_NAME_LETTERS or not _NAME.fullmatch(name):
         raise SpringfootError(
-            f"name must be 1 to {MOST_NAME_LETTERS} letters, digits, spaces and ,.:()+-, got {quoted(name)}"
+            f"name must be 1 to {MOST_NAME_LETTERS} letters a to z, digits, spaces and ,.:()+-, got {quoted(name)}"
         )
-    if not is_baseline(policy) and _BASELINE.match(name):
+    begin = _BASELINE.match(name)
+    if is_baseline(policy):
+        own = policy.partition(":")[0]
+        if begin is None or begin["baseline"].lower() != own:
+            raise SpringfootError(f"name of the baseline {own} must begin with {own}, got {quoted(name)}")
+    elif begin is not None:
         raise SpringfootError(f"name must not begin with a baseline's, {', '.join(BASELINES)}, got {quoted(name)}")

@@ -55,6 +55,11 @@ def test_the_schedule_has_a_score_whatever_it_is_called():
     assert {name: by_task[WALK].tolist() for name, by_task in scores.items()} == {SCHEDULE: [0.75]}
 
 
+def test_another_baseline_has_none_as_it_does_not_learn():
+    springs = [row(f"constant, seed {seed}", WALK, f"constant:{seed},40", 250.0 + seed) for seed in range(5)]
+    assert learner_scores([*ENDS, *springs]) == {}
+
+
 def test_the_outer_quarters_do_not_count():
     middle, low, high = interval([np.array([-1000.0, 1.0, 2.0, 3.0, 1000.0])])
     assert middle == 2.0

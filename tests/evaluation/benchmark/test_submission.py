@@ -44,14 +44,17 @@ def walk_few(monkeypatch, episodes=FEW):
 
 @pytest.fixture(scope="module")
 def submitted(tmp_path_factory):
-    """A submission of a policy's file, whose actions make it fall soon, and a committed one of springs."""
+    """A submission of a policy's file, whose actions make it fall soon, and committed ones of springs and a learner."""
     folder = tmp_path_factory.mktemp("submissions")
     policy = read_policy("predicted")
     soft = replace(policy, biases=(*policy.biases[:-1], np.full_like(policy.biases[-1], -100.0)))
     save_policy(folder / "soft.safetensors", soft)
     return [
         benchmark.submit(str(folder / "soft.safetensors"), "FromThePlanBoth-v0", "ours", folder / "ours", threads=1),
-        benchmark.read_submission(REPOSITORY / "benchmarks" / "submissions" / TASK / "constant"),
+        *(
+            benchmark.read_submission(REPOSITORY / "benchmarks" / "submissions" / TASK / name)
+            for name in ("constant", "ppo-500000-seed-0")
+        ),
     ]
 
 
@@ -218,6 +221,7 @@ def test_a_changed_number_is_refused(submitted, tmp_path):
         ({"name": "a|b"}, "name must be 1 to 60 letters"),
         ({"name": "*a*"}, "bad/submission.json is no submission: name must be 1 to 60 letters"),
         ({"name": "_a_"}, "name must be 1 to 60 letters"),
+        ({"name": "best \N{CYRILLIC SMALL LETTER ES}onstant"}, "name must be 1 to 60 letters a to z"),
         ({"fell": ["a"] * 100}, "it needs 100 returns, and falls of 0 or 1"),
         ({"return_mean": 9e9}, "return_mean and falls must be those of its episodes"),
         ({"falls": 77}, "return_mean and falls must be those of its episodes"),
@@ -240,6 +244,13 @@ def test_a_baseline_s_name_is_a_baseline_s(submitted, tmp_path, name):
     path.write_bytes(object_with_digest({**json.loads(path.read_bytes()), "name": name}))
     with pytest.raises(SpringfootError, match="name must not begin with a baseline's, untrained, random, constant, "):
         benchmark.read_submission(folder)
+
+
+@pytest.mark.parametrize("name", ["Deep RL, seed 0", "random springs", "best schedule"])
+def test_a_baseline_has_its_own_name(submitted, tmp_path, name):
+    with pytest.raises(SpringfootError, match=r"^name of the baseline constant must begin with constant, got '"):
+        benchmark.submit("constant:300,40", TASK, name, tmp_path / "named", threads=1)
+    assert not (tmp_path / "named").exists()
 
 
 @pytest.mark.parametrize(
@@ -305,16 +316,18 @@ def entered(submission, folder, *, factor, mean=1.0, drawn=2.0):
     (folder / benchmark.JUDGED).write_bytes(object_with_digest(a_judgement(submission) | means))
 
 
-def named(folder, policy):
-    """Make the submission in `folder`, and its judgement, that of a baseline's name."""
+def entered_baseline(submission, folder, policy, **numbers):
+    """Enter the submission of springs in a new folder as a baseline under its own name."""
+    entered(submission, folder, **numbers)
     own = {"policy": policy, "policy_digest": sha256(policy.encode()).hexdigest()}
-    for path, kind in ((folder / benchmark.SUBMISSION, "submission"), (folder / benchmark.JUDGED, "judgement")):
-        path.write_bytes(object_with_digest(read_object(path, kind) | own))
+    submitted, judged = folder / benchmark.SUBMISSION, folder / benchmark.JUDGED
+    submitted.write_bytes(object_with_digest(read_object(submitted, "submission") | own | {"name": policy}))
+    judged.write_bytes(object_with_digest(read_object(judged, "judgement") | own))
 
 
 def test_a_table_has_eight_rows_and_says_how_many_more_there_are(submitted, tmp_path):
     for place, name in enumerate("abcdefghij"):
-        entered(submitted[1], tmp_path / name, factor=1.0 + 0.001 * place)
+        entered(submitted[2], tmp_path / name, factor=1.0 + 0.001 * place)
     board = leaderboard(tmp_path)
     assert "\n| h |" in board
     assert "\n| i |" not in board
@@ -323,11 +336,9 @@ def test_a_table_has_eight_rows_and_says_how_many_more_there_are(submitted, tmp_
 
 def test_the_ends_of_the_score_are_always_in_the_table(submitted, tmp_path):
     for place, name in enumerate("abcdefghij"):
-        entered(submitted[1], tmp_path / name, factor=1.0 + 0.001 * place)
-        named(tmp_path / name, "quasi_stiffness")
+        entered(submitted[2], tmp_path / name, factor=1.0 + 0.001 * place)
     for place, policy in enumerate(("constant:300,40", "random", "constant:200,40")):
-        entered(submitted[1], tmp_path / policy, factor=0.5 + 0.1 * place, mean=-1.0 - place)
-        named(tmp_path / policy, policy)
+        entered_baseline(submitted[1], tmp_path / policy, policy, factor=0.5 + 0.1 * place, mean=-1.0 - place)
     board = leaderboard(tmp_path)
     rows = [line.split(" | ")[0] for line in board.splitlines() if line.startswith("| ")][2:]
     assert rows == ["| a", "| b", "| c", "| d", "| e", "| f", "| constant:300,40", "| random"]
@@ -335,36 +346,40 @@ def test_the_ends_of_the_score_are_always_in_the_table(submitted, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("springs_drawn", "drawn", "better"),
-    [(4.0, "2.25 (2.00 to 2.50)", f"{TASK}."), (12.0, "0.75 (0.67 to 0.83)", f"no task. Not better: {TASK}.")],
+    ("seeds", "springs_drawn", "score", "drawn", "better"),
+    [
+        (5, 4.0, "2.50 (1.67 to 3.33)", "3.00 (2.17 to 3.83)", f"{TASK}."),
+        (5, 12.0, "2.50 (1.67 to 3.33)", "1.00 (0.72 to 1.28)", f"no task. Not better: {TASK}."),
+        (2, 4.0, "1.75 (1.50 to 2.00), 2 seeds", "2.25 (2.00 to 2.50), 2 seeds", f"no task. Not better: {TASK}."),
+    ],
 )
-def test_trainings_of_one_learner_are_one_entry_with_both_scores(submitted, tmp_path, springs_drawn, drawn, better):
-    entries = [("random", "random", 1.0, 0.0), ("springs", "constant:300,40", 3.0, springs_drawn)]
-    entries += [(f"ours, seed {seed}", "quasi_stiffness", 4.0 + seed, 8.0 + 2.0 * seed) for seed in (0, 1)]
-    for name, policy, mean, drawn_mean in entries:
-        entered(submitted[1], tmp_path / name, factor=mean, mean=mean, drawn=drawn_mean)
-        named(tmp_path / name, policy)
-    for seed in (0, 1):
-        (tmp_path / f"ours, seed {seed}").rename(tmp_path / f"sac-800-seed-{seed}")
+def test_trainings_of_one_learner_are_one_entry(submitted, tmp_path, seeds, springs_drawn, score, drawn, better):
+    for policy, mean, drawn_mean in (("random", 1.0, 0.0), ("constant:300,40", 3.0, springs_drawn)):
+        entered_baseline(submitted[1], tmp_path / policy, policy, factor=mean, mean=mean, drawn=drawn_mean)
+    for seed in range(seeds):
+        folder = tmp_path / f"ours, seed {seed}"
+        entered(submitted[2], folder, factor=4.0 + seed, mean=4.0 + seed, drawn=8.0 + 2.0 * seed)
+        folder.rename(tmp_path / f"sac-800-seed-{seed}")
     board = leaderboard(tmp_path)
-    assert f"| {TASK} | 1.75 (1.50 to 2.00) |" in board  # 4 and 5, where random returns 1 and springs 3
+    assert f"| {TASK} | {score} |" in board  # 4, 5, ... where random returns 1 and springs 3
     assert f"| {TASK} | {drawn} |" in board
     assert f"with all of both intervals, on: {better}\n" in board
-    left = " ".join(f"{name}-{VERSION}" for name in STIFFNESS_TASKS if f"{name}-{VERSION}" != TASK)
+    tasks = [f"{name}-{VERSION}" for name in STIFFNESS_TASKS]
+    left = " ".join(task for task in tasks if task != TASK or seeds < 5)
     assert f'- ours: `make benchmark BENCHMARK="--learners sac --timesteps 800 --tasks {left}"`' in board
-    assert "| ours (2 seeds) | 4 (4 to 5) |" in board and "seed 0" not in board
+    assert f"| ours ({seeds} seeds) |" in board and "seed 0" not in board
 
 
 def test_a_table_is_in_the_order_of_returns(submitted, tmp_path):
     for name, mean in (("low", 1.0), ("high", 3.0), ("between", 2.0)):
-        entered(submitted[1], tmp_path / name, factor=mean, mean=mean)
+        entered(submitted[2], tmp_path / name, factor=mean, mean=mean)
     rows = [line for line in leaderboard(tmp_path).splitlines() if line.startswith("| ")][2:]
     assert [row.split(" | ")[0] for row in rows] == ["| high", "| between", "| low"]
 
 
 def test_an_entry_that_returns_nearly_as_another_does_is_refused(submitted, tmp_path):
     for name, factor in (("copy", 1.0 + 1e-5), ("first", 1.0)):
-        entered(submitted[1], tmp_path / name, factor=factor)
+        entered(submitted[2], tmp_path / name, factor=factor)
     with pytest.raises(SpringfootError) as caught:
         leaderboard(tmp_path)
     told = f"{tmp_path / 'first'} returns nearly the same as {tmp_path / 'copy'}: keep one of them"
