@@ -30,7 +30,7 @@ from springfoot.envs import Biped
 from springfoot.envs.control.stiffness_control import stiffness_ranges
 from springfoot.envs.settings.settings import body_of
 from springfoot.errors import SpringfootError, require_count
-from springfoot.evaluation.benchmark.learner_scores import SEEDS
+from springfoot.evaluation.benchmark.learner_scores import ENTRY_SEEDS
 from springfoot.evaluation.benchmark.submission import JUDGED, SUBMISSION, judge_submission, read_submission, submit
 from springfoot.evaluation.benchmark.task_walks import settings_of_task
 from springfoot.tasks import STIFFNESS_TASKS, VERSION
@@ -142,7 +142,9 @@ def main() -> None:
     known = get_args(Learner)
     parser.add_argument("--learners", nargs="*", choices=known, default=["ppo"], help="who learns (default: ppo, ours)")
     parser.add_argument("--tasks", nargs="+", choices=tasks, default=tasks, help="tasks (default: all)")
-    parser.add_argument("--seeds", type=int, default=SEEDS, help=f"trainings of each task (default: {SEEDS})")
+    parser.add_argument(
+        "--seeds", type=int, default=ENTRY_SEEDS, help=f"trainings of each task (default: {ENTRY_SEEDS})"
+    )
     parser.add_argument("--timesteps", type=int, default=500_000, help="of each training (default: 500,000)")
     parser.add_argument("--engine", choices=get_args(Engine), default="here", help="where PPO trains (default: here)")
     flags = parser.parse_args()

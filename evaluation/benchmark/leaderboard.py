@@ -18,7 +18,7 @@ from .learner_scores import (
     CONSTANT,
     RANDOM,
     SCHEDULE,
-    SEEDS,
+    ENTRY_SEEDS,
     LearnerScores,
     interval,
     interval_text,
@@ -97,29 +97,29 @@ def _scores_section(public: LearnerScores, drawn: LearnerScores) -> str:
 
 def _not_run(rows: Sequence[JudgedRow], scores: LearnerScores) -> str:
     """Return a Markdown list of the commands that run the learners of `make benchmark` on the tasks where they have
-    fewer than `SEEDS` trainings; empty if there are none."""
+    fewer than `ENTRY_SEEDS` trainings; empty if there are none."""
     lines = []
     for learner, by_task in scores.items():
         tasks = [f"{name}-{VERSION}" for name in STIFFNESS_TASKS]
-        left = [task for task in tasks if len(by_task.get(task, ())) < SEEDS]
+        left = [task for task in tasks if len(by_task.get(task, ())) < ENTRY_SEEDS]
         folders = [row.submission.folder.name for row in rows if row.entry == learner]
         made = next(filter(None, map(_OF_MAKE.fullmatch, folders)), None)
         if left and made:
             flags = f"--learners {made['learner']} --timesteps {made['timesteps']} --tasks {' '.join(left)}"
             lines.append(f'- {learner}: `make benchmark BENCHMARK="{flags}"`')
-    return "\n".join([f"Commands of the cells that are not run with {SEEDS} seeds:", "", *lines]) if lines else ""
+    return "\n".join([f"Commands of the cells that are not run with {ENTRY_SEEDS} seeds:", "", *lines]) if lines else ""
 
 
 def _scores_table(head: str, tasks: Sequence[str], scores: LearnerScores) -> str:
     """Return the Markdown table of scores: a row for each of `tasks`, and one for all of them together. Where a learner
-    has fewer than `SEEDS` trainings, their number is told."""
+    has fewer than `ENTRY_SEEDS` trainings, their number is told."""
 
     def cell(learner: str, task: str) -> str:
         """Return the text of a learner's scores on a task."""
         found = scores[learner].get(task)
         if found is None:
             return "not run"
-        is_whole = learner == SCHEDULE or len(found) >= SEEDS
+        is_whole = learner == SCHEDULE or len(found) >= ENTRY_SEEDS
         return interval_text([found], ".2f") + ("" if is_whole else f", {len(found)} seeds")
 
     lines = [[task, *(cell(learner, task) for learner in scores)] for task in tasks]
@@ -130,6 +130,6 @@ def _scores_table(head: str, tasks: Sequence[str], scores: LearnerScores) -> str
 
 def _beats_springs(task: str, *scores: Mapping[str, NDArray]) -> bool:
     """Return whether a learner's score on a task lies above 1 with all of its interval, by each of `scores`, task ->
-    scores of `SEEDS` trainings or more."""
+    scores of `ENTRY_SEEDS` trainings or more."""
     found = (by_task.get(task) for by_task in scores)
-    return all(own is not None and len(own) >= SEEDS and interval([own])[1] > 1.0 for own in found)
+    return all(own is not None and len(own) >= ENTRY_SEEDS and interval([own])[1] > 1.0 for own in found)

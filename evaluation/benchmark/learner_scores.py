@@ -16,7 +16,7 @@ from springfoot.arrays import NDArray
 from .judged import JudgedRow
 from .task_walks import is_baseline
 
-SEEDS = 5
+ENTRY_SEEDS = 5
 """Trainings of an entry that is whole; chosen. One with fewer is told."""
 _RESAMPLES = 50_000
 """Resamples of the bootstrap, as in the paper's library, rliable."""
