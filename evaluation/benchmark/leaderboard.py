@@ -16,9 +16,9 @@ from springfoot.tasks import STIFFNESS_TASKS, TASKS, VERSION
 from .judged import JudgedRow, judged_rows
 from .learner_scores import (
     CONSTANT,
+    ENTRY_SEEDS,
     RANDOM,
     SCHEDULE,
-    ENTRY_SEEDS,
     LearnerScores,
     interval,
     interval_text,
