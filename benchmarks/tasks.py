@@ -33,6 +33,7 @@ from springfoot.errors import SpringfootError, require_count
 from springfoot.evaluation.benchmark.learner_scores import ENTRY_SEEDS
 from springfoot.evaluation.benchmark.submission import JUDGED, SUBMISSION, judge_submission, read_submission, submit
 from springfoot.evaluation.benchmark.task_walks import settings_of_task
+from springfoot.extras import exiting_if_missing
 from springfoot.tasks import STIFFNESS_TASKS, VERSION
 
 Learner = Literal["ppo", "sb3-ppo", "sac", "tqc"]
@@ -78,9 +79,9 @@ def best_constant(task: str) -> str:
     return "constant:" + ",".join(f"{stiffness:.3g}" for stiffness in np.exp(found.x))
 
 
-def submit_and_judge(policy: str, task: str, name: str, folder: Path) -> None:
-    """Submit and judge a policy, as far as that is not done."""
-    if not (folder / SUBMISSION).exists():
+def submit_and_judge(policy: str | None, task: str, name: str, folder: Path) -> None:
+    """Submit and judge a policy, as far as that is not done; None for one that was submitted before."""
+    if policy is not None and not (folder / SUBMISSION).exists():
         folder.parent.mkdir(parents=True, exist_ok=True)
         submit(policy, task, name, folder, threads=2)
     if not (folder / JUDGED).exists():
@@ -162,14 +163,16 @@ def main() -> None:
             submit_and_judge(springs, task, f"best {springs}", SUBMISSIONS / task / "constant")
     for learner in flags.learners:
         folders = {run: SUBMISSIONS / run[0] / label_of(learner, flags.timesteps, run[1]) for run in runs}
-        left = [run for run in runs if not (folders[run] / JUDGED).exists()]
+        left = [run for run in runs if not (folders[run] / SUBMISSION).exists()]
         if learner == "ppo":
-            policies = train_ours(left, flags.timesteps, flags.engine)
+            with exiting_if_missing():  # Ray
+                policies = train_ours(left, flags.timesteps, flags.engine)
         else:
             policies = train_others(learner, left, flags.timesteps)
-        for (task, seed), policy in policies.items():
+        for run in runs:
+            task, seed = run
             name = f"{NAMES[learner]}, {flags.timesteps:,} steps, seed {seed}"
-            submit_and_judge(policy, task, name, folders[task, seed])
+            submit_and_judge(policies.get(run), task, name, folders[run])
 
 
 if __name__ == "__main__":
