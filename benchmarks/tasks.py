@@ -6,7 +6,10 @@
 Each is trained, submitted and judged once, in benchmarks/submissions; the same command goes on after a stop. The best
 constant springs are the best of `ANKLES` x `TOES`, searched on from there by Nelder and Mead's simplex, by 24 episodes
 with seeds that no submission has; where the feet differ, each leg has its own. Other learners than our PPO train by
-examples/learners/sb3.py, in the virtual environment of `make test-learners`.
+examples/learners/sb3.py, in the virtual environment of `make test-learners`. On a Ray cluster our PPO trains in that of
+`make test-rllib`:
+
+    build/rllib/bin/python -m benchmarks.tasks --engine ray
 """
 
 import argparse
@@ -155,6 +158,8 @@ def main() -> None:
         replace(task_training(flags.tasks[0]), timesteps=flags.timesteps)
     except SpringfootError as error:
         parser.error(str(error))
+    if flags.engine != "here" and flags.learners != ["ppo"]:
+        parser.error(f"engine {flags.engine} trains our PPO alone: --learners ppo")
     for task in flags.tasks:
         for policy in ("random", "schedule"):
             submit_and_judge(policy, task, policy, SUBMISSIONS / task / policy)

@@ -32,13 +32,14 @@ LearnerScores = Mapping[str, Mapping[str, NDArray]]
 
 
 def baseline_returns(rows: Sequence[JudgedRow], of: Return = "return_mean") -> dict[tuple[str, str], float]:
-    """Return (baseline, task) -> highest mean return of random stiffness and of constant springs."""
-    ends: dict[tuple[str, str], float] = {}
+    """Return (baseline, task) -> mean return of random stiffness and of constant springs, those with the highest public
+    return."""
+    best: dict[tuple[str, str], JudgedRow] = {}
     for row in rows:
-        task, kind = row.submission.task, row.submission.policy.partition(":")[0]
-        if kind in (RANDOM, CONSTANT):
-            ends[kind, task] = max(getattr(row, of), ends.get((kind, task), -np.inf))
-    return ends
+        end = row.submission.policy.partition(":")[0], row.submission.task
+        if end[0] in (RANDOM, CONSTANT) and (end not in best or row.return_mean > best[end].return_mean):
+            best[end] = row
+    return {end: getattr(row, of) for end, row in best.items()}
 
 
 def learner_scores(rows: Sequence[JudgedRow], of: Return = "return_mean") -> LearnerScores:

@@ -46,6 +46,14 @@ def test_drawn_returns_have_scores_of_their_own_and_none_where_both_baselines_re
     assert learner_scores([*ENDS, *trainings("ours", WALK, 100.0, 300.0)], "drawn_return_mean") == {}
 
 
+def test_the_best_constant_springs_are_those_of_the_highest_public_return():
+    ends = [row("random", WALK, "random", 1.0, 10.0), row("best", WALK, "constant:50,10", 3.0, 20.0)]
+    lucky = row("lucky when drawn", WALK, "constant:60,10", 2.0, 30.0)
+    ours = [row(f"ours, seed {seed}", WALK, "policy", 3.0, 20.0) for seed in range(2)]
+    for order in ([*ends, lucky], [lucky, *ends]):
+        np.testing.assert_allclose(learner_scores([*order, *ours], "drawn_return_mean")["ours"][WALK], [1.0, 1.0])
+
+
 def test_one_training_has_no_spread_and_a_task_without_baselines_no_score():
     assert learner_scores([*ENDS, *trainings("once", WALK, 400.0), *trainings("ours", PUSHED, 1.0, 2.0)]) == {}
 
