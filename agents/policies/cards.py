@@ -11,22 +11,26 @@ from springfoot.files.text_table import read_bytes
 from .policy import PRETRAINED_BY, SHIPPED, find_policy, read_policy
 
 MADE = {
-    "pretrained": ("Walks on level ground at 1.2 m/s, and goes on when it is pushed.", f"`{PRETRAINED_BY}`", "walk"),
+    "pretrained": (
+        "Walks on level ground at 1.2 m/s, and goes on when it is pushed.",
+        f"`{PRETRAINED_BY}`",
+        "docs/results/walk.md",
+    ),
     "expert": (
         "Sets the stiffness on the frozen task Walk-v0, where `learned` walks; a set for offline learning.",
         "`springfoot train --task Walk-v0 --timesteps 500000 --out runs/expert`",
-        "leaderboard",
+        "docs/results/leaderboard.md",
     ),
     "medium": (
         "The same after a fifth of the training, worse than the best constant springs; another such set.",
         "`springfoot train --task Walk-v0 --timesteps 100000 --out runs/medium`",
-        "leaderboard",
+        "benchmarks/submissions/Walk-v0/medium/judged.json",
     ),
     **{
         name: (
             "Moves hips, knees and ankles too, on any foot, body, speed, step time and slope that it drew.",
             f"`springfoot train --preset person --seed {LEARNED[name].rpartition('-')[2]}`, its last policy",
-            "persons",
+            "docs/results/persons.md",
         )
         for name in SHIPPED
         if name.startswith("learned")
@@ -34,10 +38,10 @@ MADE = {
     "predicted": (
         "Walks by a plan that knows no person's curves; it moves hips, knees and ankles too, from untuned constants.",
         "`springfoot train --preset predict --seed 1`, its last policy",
-        "prediction",
+        "docs/results/prediction.md",
     ),
 }
-"""Policy -> purpose, the command that made it, and the page of its results."""
+"""Policy -> purpose, the command that made it, and the file of its results."""
 SHARED_LIMITS = "One planar body in simulation; a stiffness that walks here is none for a patient's foot."
 """Limits of every policy that comes with the package."""
 ONE_BODY = " {} and other bodies were not trained: measure them first (`springfoot study compare --world`)."
@@ -63,7 +67,7 @@ def policy_card(name: str) -> str:
             f"no policy {name!r} in the package; there are {', '.join(SHIPPED)}{perhaps(name, SHIPPED)}"
         )
     policy = read_policy(name)
-    purpose, command, page = MADE[name]
+    purpose, command, results = MADE[name]
     defaults = settings_to_json(BipedSettings())
     changed = {key: value for key, value in settings_to_json(policy.settings).items() if value != defaults[key]}
     layers = " - ".join(map(str, policy.layer_sizes))
@@ -73,7 +77,7 @@ def policy_card(name: str) -> str:
     further = "" if policy.settings.drawn_bodies else ONE_BODY.format("Slopes, loads" if level else "Loads")
     lines = [
         f"made by: {command}",
-        f"results and falls: docs/results/{page}.md",
+        f"results and falls: {results}",
         f"network: {layers}, {policy.activation}{legs}; observations to {ACTED_ON[policy.settings.acts]}",
         f"settings of its training, where not the defaults: {differences or 'none'}",
         f"limits: {SHARED_LIMITS}{further}",
