@@ -20,6 +20,7 @@ from .learner_scores import (
     RANDOM,
     SCHEDULE,
     LearnerScores,
+    interquartile_mean,
     interval,
     interval_text,
     learner_scores,
@@ -56,7 +57,7 @@ def leaderboard(folder: Path) -> str:
 def _shown(entries: Mapping[str, Sequence[JudgedRow]]) -> list[str]:
     """Return the names of a task's best `MOST_ROWS` entries, best first; the best of random stiffness and of constant
     springs are always among them."""
-    best = sorted(entries, key=lambda name: -np.mean([row.return_mean for row in entries[name]]))
+    best = sorted(entries, key=lambda name: -interquartile_mean(np.array([row.return_mean for row in entries[name]])))
     kinds = {name: entries[name][0].submission.policy.partition(":")[0] for name in best}
     ends = {next(name for name in best if kinds[name] == kind) for kind in (RANDOM, CONSTANT) if kind in kinds.values()}
     kept = ends.union([name for name in best if name not in ends][: MOST_ROWS - len(ends)])

@@ -373,8 +373,10 @@ def test_trainings_of_one_learner_are_one_entry(submitted, tmp_path, seeds, spri
 def test_a_table_is_in_the_order_of_returns(submitted, tmp_path):
     for name, mean in (("low", 1.0), ("high", 3.0), ("between", 2.0)):
         entered(submitted[2], tmp_path / name, factor=mean, mean=mean)
+    for seed, mean in enumerate((-30.0, 2.5, 2.5, 2.5, 2.6)):  # the outer quarters do not count, as in the cell
+        entered(submitted[2], tmp_path / f"seeds, seed {seed}", factor=4.0 + seed, mean=mean)
     rows = [line for line in leaderboard(tmp_path).splitlines() if line.startswith("| ")][2:]
-    assert [row.split(" | ")[0] for row in rows] == ["| high", "| between", "| low"]
+    assert [row.split(" | ")[0] for row in rows] == ["| high", "| seeds (5 seeds)", "| between", "| low"]
 
 
 def test_an_entry_that_returns_nearly_as_another_does_is_refused(submitted, tmp_path):
