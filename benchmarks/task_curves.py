@@ -21,6 +21,7 @@ from springfoot.arrays import NDArray
 from springfoot.evaluation.benchmark.judged import judged_rows
 from springfoot.evaluation.benchmark.learner_scores import (
     CONSTANT,
+    ENTRY_SEEDS,
     RANDOM,
     LearnerScores,
     baseline_returns,
@@ -35,8 +36,8 @@ from springfoot.tasks import STIFFNESS_TASKS, VERSION
 RESULTS = Path(__file__).parents[1] / "docs" / "results"
 THRESHOLDS = np.linspace(0.0, 2.0, 201)
 """Scores at which profiles are drawn."""
-TIMESTEPS, SEEDS = 500_000, 5
-"""Steps and seeds of the runs with curves: the defaults of `make benchmark`."""
+TIMESTEPS = 500_000
+"""Steps of the runs with curves: the default of `make benchmark`."""
 CURVES = RESULTS / "csv" / "benchmark_curves.csv"
 Curves = Mapping[str, tuple[NDArray, NDArray]]
 """Task -> (E,) environment steps of the periodic evaluations, and (E,) interquartile mean of their returns."""
@@ -57,7 +58,7 @@ def learning_curves() -> Curves:
     """Return the curve of each task with finished runs of all seeds here, in the run's own evaluation episodes."""
     curves = {}
     for task in (f"{name}-{VERSION}" for name in STIFFNESS_TASKS):
-        folders = [RUNS / task / label_of("ppo", TIMESTEPS, seed) for seed in range(SEEDS)]
+        folders = [RUNS / task / label_of("ppo", TIMESTEPS, seed) for seed in range(ENTRY_SEEDS)]
         if all(folder.is_dir() for folder in folders):
             entries = [read_record(folder)["evaluations"] for folder in folders]
             returns = np.array([[entry["return_mean"] for entry in own] for own in entries])
